@@ -12,7 +12,7 @@ use modelmill::{Model, Outcome, report};
 fn main() -> Outcome {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let model = Model::open(root.join("model-spec/models/spidermill.toml"))?;
-    println!("{} base parameters, eq. (16):", model.base.len());
+    println!("{} base parameters:", model.base.len());
     for base in &model.base {
         println!("  {} = {}", base.name, base.expression);
     }

@@ -105,7 +105,7 @@ impl Model {
         page.marks("# ").text(&entry.name).marks("\n\n").text(&entry.title);
         page.marks(".\n\n").picture(&entry.name, &format!("{}.svg", entry.name));
         page.marks("\n\n").text(&entry.summary_text());
-        page.marks(".\n\n## Base parameters, eq. (16)\n\n| | expression | value | unit |\n|---|---|---:|---|\n");
+        page.marks(".\n\n## Base parameters\n\n| | expression | value | unit |\n|---|---|---:|---|\n");
         for (base, value) in self.base.iter().zip(&self.nominal) {
             page.marks("| ").code(&base.name).marks(" | ").code(&base.expression);
             page.marks(" | ").text(&significant(*value, 6)).marks(" | ");

@@ -110,7 +110,7 @@ pub fn figures(
     Ok(figures)
 }
 
-/// Error metrics of the decimated forces that a fit used; `None` if no recording is decimated.
+/// Error figures of the decimated forces that a fit used; `None` if no recording is decimated.
 ///
 /// Fails as [`figures`] does.
 pub fn figures_of_rows(

@@ -10,7 +10,8 @@
 //!
 //! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. A [`print::StepSpelling`]
 //! formats the recommended next steps, such as adding an effect to the model file: as a command, as a Python call, or
-//! in words for a caller of the Rust library.
+//! in words for a caller of this Rust library ([`print::LibrarySpelling`]; the name does not refer to a library of
+//! effects).
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
 //! own values.
@@ -25,7 +26,7 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! // `retained` is the product of parameters whose regressor column was kept for this base parameter.
+//! // Of several dependent regressor columns, the column of this product was retained for the base parameter.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
@@ -61,16 +62,16 @@
 //! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
 //! | [`servo::ServoModel::identify`] | base parameters and gains from commands or currents, without forces |
 //! | [`Model::add_actuator_forces`] | recordings with the forces of actuators, computed from their signals |
-//! | [`Model::compare`] | error metrics (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
+//! | [`Model::compare`] | error figures (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors over horizons |
 //! | [`Model::diagnose`] | the physical effects that are missing |
-//! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects with the states pass, fail, not evaluated |
+//! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects with the results pass, fail, not evaluated |
 //! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
 //! | [`Host::simulate`] | simulation of a rig (a numeric model of the complete machine, used in place of hardware) along a trajectory |
 //! | [`Host::reduce`] | the reduction of a rig to a planar model |
 //! | [`Host::propose_plan`] | a plan for this reduction |
-//! | [`Host::check_rig`] | the contents of a rig, and whether its joints close |
+//! | [`Host::check_rig`] | the contents of a rig, and whether its loops close |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |
 //! | [`Model::adopt`] | the model file with the values of a fit |
@@ -187,7 +188,7 @@
 //! [`files`], [`text`], [`error`], [`progress`], [`host`], [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`],
 //! [`faults`], [`recording`], [`compare`], [`evaluate`], [`states`], [`forward`], [`identify`], [`servo`], [`runs`], [`diagnose`],
 //! [`verify`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`rig_check`], [`reduce`], [`mod@import`], [`mod@export`],
-//! [`mod@print`], [`report`].
+//! [`options`], [`mod@print`], [`report`].
 
 pub mod add;
 pub mod adopt;

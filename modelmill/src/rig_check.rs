@@ -1,4 +1,4 @@
-//! `check` of a rig: whether its joints close, and what it contains.
+//! `check` of a rig: whether its loops close, and what it contains.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ const MOST_EXTENDED: usize = 16;
 /// Number of joints that an error lists.
 const LISTED_GAPS: usize = 5;
 
-/// Contents of a rig whose joints close.
+/// Contents of a rig whose loops close.
 #[derive(Clone, Debug)]
 pub struct RigCheck {
     /// Name of the rig.

@@ -194,7 +194,8 @@ pub(crate) struct DiagnosisArgs {
     #[arg(long)]
     pub(crate) held: bool,
     /// Base parameters of an earlier fit (a file that `identify` wrote), for example of a run without load. They are
-    /// fixed, or may change within their uncertainty if the fit contains a covariance
+    /// fixed, or may change within their uncertainty if the fit contains a covariance. `nominal`, the default, selects no
+    /// fit: the base parameters are estimated, or fixed at their nominal values with --held
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", hide_default_value = true,
         value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,

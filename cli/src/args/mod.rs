@@ -75,7 +75,7 @@ pub(crate) struct CommandLine {
 pub(crate) enum ProgramCommand {
     /// Validate a model file and print a summary
     #[command(
-        after_help = "The numeric rank, eq. (9), is that of the regressor at random states with the file's values. Its gap is the \
+        after_help = "The numeric rank is that of the regressor at random states with the file's values. Its gap is the \
         ratio of the last nonzero singular value to the next, or to the level of rounding. Below 1000 the rank is uncertain, and a \
         warning is printed.\n\n\
         Examples (from the project's root):\n  modelmill check model-spec/models/spidermill.toml\n  \

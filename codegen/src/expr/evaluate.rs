@@ -152,6 +152,79 @@ impl EvaluationTape {
         tape
     }
 
+    /// The part that some of the roots need, given by their places.
+    pub fn restricted_to(&self, roots: &[usize]) -> Self {
+        let mut is_needed = vec![false; self.steps.len()];
+        for root in roots {
+            is_needed[self.roots[*root] as usize] = true;
+        }
+        let range = |range: &Range<u32>| range.start as usize..range.end as usize;
+        // Operands stand before the steps that use them.
+        for i in (0..self.steps.len()).rev() {
+            if !is_needed[i] {
+                continue;
+            }
+            match &self.steps[i] {
+                TapeStep::Sum(operands) | TapeStep::Product(operands) => {
+                    for operand in &self.operands[range(operands)] {
+                        is_needed[operand.step as usize] = true;
+                    }
+                }
+                TapeStep::Unary(_, argument) => is_needed[*argument as usize] = true,
+                TapeStep::Rational(_) | TapeStep::Atom(_) | TapeStep::Sin(_) | TapeStep::Cos(_) => {}
+            }
+        }
+        let mut part = Self {
+            steps: Vec::new(),
+            operands: Vec::new(),
+            rationals: Vec::new(),
+            angles: Vec::new(),
+            n_divisors: 0,
+            roots: Vec::new(),
+        };
+        // New places of steps, numbers and divisors. Each angle belongs to one sine and one cosine at most.
+        let mut positions = vec![0; self.steps.len()];
+        let (mut places, mut divisors) = (FxHashMap::default(), FxHashMap::default());
+        for (i, step) in self.steps.iter().enumerate().filter(|(i, _)| is_needed[*i]) {
+            positions[i] = index(part.steps.len());
+            let mut place = |rationals: &mut Vec<Rational>, old: u32| {
+                *places.entry(old).or_insert_with(|| {
+                    rationals.push(self.rationals[old as usize].clone());
+                    index(rationals.len() - 1)
+                })
+            };
+            let start = index(part.operands.len());
+            let mut push_operands = |part: &mut Self, operands: &Range<u32>| {
+                for operand in &self.operands[range(operands)] {
+                    let kind = match operand.kind {
+                        OperandKind::Scaled(old) => OperandKind::Scaled(place(&mut part.rationals, old)),
+                        OperandKind::Divided(n, old) => {
+                            let next = index(divisors.len());
+                            OperandKind::Divided(n, *divisors.entry(old).or_insert(next))
+                        }
+                        kind @ (OperandKind::Plain | OperandKind::Raised(_)) => kind,
+                    };
+                    let step = positions[operand.step as usize];
+                    part.operands.push(TapeOperand { step, kind });
+                }
+                start..index(part.operands.len())
+            };
+            let step = match step {
+                TapeStep::Sum(operands) => TapeStep::Sum(push_operands(&mut part, operands)),
+                TapeStep::Product(operands) => TapeStep::Product(push_operands(&mut part, operands)),
+                TapeStep::Rational(old) => TapeStep::Rational(place(&mut part.rationals, *old)),
+                TapeStep::Atom(atom) => TapeStep::Atom(*atom),
+                TapeStep::Sin(angle) => TapeStep::Sin(part.push_angle(&self.angles[*angle as usize])),
+                TapeStep::Cos(angle) => TapeStep::Cos(part.push_angle(&self.angles[*angle as usize])),
+                TapeStep::Unary(function, argument) => TapeStep::Unary(*function, positions[*argument as usize]),
+            };
+            part.steps.push(step);
+        }
+        part.n_divisors = divisors.len();
+        part.roots = roots.iter().map(|root| positions[self.roots[*root] as usize]).collect();
+        part
+    }
+
     fn push_angle(&mut self, angle: &AtomAngleSum) -> u32 {
         self.angles.push(angle.clone());
         index(self.angles.len() - 1)

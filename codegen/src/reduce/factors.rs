@@ -1,6 +1,8 @@
 //! The factors of eq. (6) as rational functions of the constants. Simple relations between columns are reconstructed
 //! from points of motion, and the factors are combined from these.
 
+use std::collections::BTreeSet;
+
 use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use super::dependences::DependenceStructure;
@@ -8,7 +10,7 @@ use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
 use super::rational_function::RationalFunction;
 use super::reconstruct::{self, DependenceSurvey, FunctionNeed};
 use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations, TreeStructure};
-use super::sample::SampledRegressor;
+use super::sample::{ColumnEvaluation, SampledRegressor};
 use super::tree_columns::TreeColumns;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -70,13 +72,7 @@ pub(super) fn n_quotients(
         found += reconstruct::n_quotients(&mut oracle, variables, stream)?;
     }
     if !others.is_empty() {
-        let mut oracle = MotionFactorOracle {
-            regressor,
-            dependences,
-            relations: &others,
-            sampling: stream.clone(),
-            budget: &mut budget,
-        };
+        let mut oracle = MotionFactorOracle::new(regressor, dependences, &others, stream, &mut budget);
         found += reconstruct::n_quotients(&mut oracle, variables, stream)?;
     }
     Ok(found)
@@ -199,13 +195,8 @@ impl FactorSearch<'_> {
         }
         let mut of_others = Vec::new();
         if !others.is_empty() {
-            let mut oracle = MotionFactorOracle {
-                regressor: self.regressor,
-                dependences: self.dependences,
-                relations: &others,
-                sampling: stream.clone(),
-                budget: &mut self.budget,
-            };
+            let (regressor, dependences) = (self.regressor, self.dependences);
+            let mut oracle = MotionFactorOracle::new(regressor, dependences, &others, stream, &mut self.budget);
             of_others = reconstruct_factors(&mut oracle, &others, &may_wait, self.variables, self.roots, stream)?;
         }
         // Back in the order of the relations.
@@ -308,10 +299,39 @@ struct MotionFactorOracle<'a> {
     dependences: &'a DependenceStructure,
     /// Relations whose factors are evaluated.
     relations: &'a [ColumnRelation],
+    /// The columns of these relations, in ascending order.
+    columns: Vec<usize>,
+    /// Evaluates these columns alone: a relation between few links needs a small part of the regressor.
+    evaluation: ColumnEvaluation,
     /// Random numbers for the points.
     sampling: RandomStream,
     /// Remaining field operations.
     budget: &'a mut OperationBudget,
+}
+
+impl<'a> MotionFactorOracle<'a> {
+    /// Evaluates the factors of relations at points that `stream` draws.
+    fn new(
+        regressor: &'a SampledRegressor,
+        dependences: &'a DependenceStructure,
+        relations: &'a [ColumnRelation],
+        stream: &RandomStream,
+        budget: &'a mut OperationBudget,
+    ) -> Self {
+        let columns: BTreeSet<usize> = (relations.iter())
+            .flat_map(|relation| relation.columns().chain([relation.column]))
+            .collect();
+        let columns: Vec<usize> = columns.into_iter().collect();
+        Self {
+            regressor,
+            dependences,
+            relations,
+            evaluation: regressor.evaluation_of(&columns),
+            columns,
+            sampling: stream.clone(),
+            budget,
+        }
+    }
 }
 
 impl PrimeFieldOracle for MotionFactorOracle<'_> {
@@ -331,12 +351,13 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         // One relation at a time: its columns at no more points than the survey of dependences used.
         if one_by_one < at_once {
             // Few points are enough for relations between few columns.
-            let mut open: Vec<RelationRows<P>> = self.relations.iter().map(RelationRows::new).collect();
+            let rows_of = |relation| RelationRows::new(relation, &self.columns);
+            let mut open: Vec<RelationRows<P>> = self.relations.iter().map(rows_of).collect();
             for _ in 0..self.dependences.n_points {
                 if open.iter().all(RelationRows::is_confirmed) {
                     break;
                 }
-                let rows = self.regressor.draw_rows(constants, &mut self.sampling)?;
+                let rows = (self.regressor).draw_rows_of(&self.evaluation, constants, &mut self.sampling)?;
                 for relation in &mut open {
                     relation.take(&rows);
                 }

@@ -121,7 +121,7 @@ impl ColumnRelation {
     }
 
     /// The columns of its factors, in the order of [`Self::values`].
-    fn columns(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn columns(&self) -> impl Iterator<Item = usize> + '_ {
         self.retained.iter().chain(&self.dependent).copied()
     }
 
@@ -347,16 +347,23 @@ pub(super) fn values<const P: u64>(
 /// The factors of a relation, from rows of values of all columns as they come.
 pub(super) struct RelationRows<'a, const P: u64> {
     relation: &'a ColumnRelation,
+    /// Where its columns stand in the rows, its own column last.
+    places: Vec<usize>,
     echelon: RowEchelonForm<P>,
     /// How many rows came when the factors were determined.
     n_more: usize,
 }
 
 impl<'a, const P: u64> RelationRows<'a, P> {
-    pub(super) fn new(relation: &'a ColumnRelation) -> Self {
+    /// A relation of which no row is known; rows consist of the given columns, which are in ascending order.
+    pub(super) fn new(relation: &'a ColumnRelation, columns: &[usize]) -> Self {
         let order: Vec<usize> = (0..=relation.len()).collect();
+        let places = (relation.columns().chain([relation.column]))
+            .map(|column| columns.binary_search(&column).expect("a column of the rows"))
+            .collect();
         Self {
             relation,
+            places,
             echelon: RowEchelonForm::new(&order),
             n_more: 0,
         }
@@ -368,8 +375,7 @@ impl<'a, const P: u64> RelationRows<'a, P> {
             if self.is_confirmed() {
                 break;
             }
-            let columns = self.relation.columns().chain([self.relation.column]);
-            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
+            let row: Vec<FieldElement<P>> = self.places.iter().map(|k| row[*k]).collect();
             if row.iter().all(|x| *x == FieldElement::ZERO) {
                 continue;
             }

@@ -100,15 +100,25 @@ impl MotionSampler {
         constants: &FieldPoint<FieldElement<P>>,
         stream: &mut RandomStream,
     ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        self.draw_of(&self.outputs, constants, stream)
+    }
+
+    /// The same for a part of the outputs.
+    fn draw_of<const P: u64>(
+        &self,
+        outputs: &EvaluationTape,
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let none = || DeriveError::NoPointFound { draws: MOST_DRAWS };
         // Without roots all values lie in the prime field.
         if !self.has_roots {
             return (0..MOST_DRAWS)
-                .find_map(|_| self.try_draw::<P, FieldElement<P>>(constants, stream))
+                .find_map(|_| self.try_draw::<P, FieldElement<P>>(outputs, constants, stream))
                 .ok_or_else(none);
         }
         let values = (0..MOST_DRAWS)
-            .find_map(|_| self.try_draw::<P, ExtensionElement<P>>(constants, stream))
+            .find_map(|_| self.try_draw::<P, ExtensionElement<P>>(outputs, constants, stream))
             .ok_or_else(none)?;
         // The imaginary parts are returned only if one of them is not zero.
         let parts: [fn(&ExtensionElement<P>) -> FieldElement<P>; 2] = [|x| x.re, |x| x.im];
@@ -120,6 +130,7 @@ impl MotionSampler {
     /// Values of the outputs at one draw; `None` if a root or a quotient does not exist there.
     fn try_draw<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
+        outputs: &EvaluationTape,
         constants: &FieldPoint<FieldElement<P>>,
         stream: &mut RandomStream,
     ) -> Option<Vec<N>> {
@@ -141,7 +152,7 @@ impl MotionSampler {
         for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(&point)?) {
             point.values.insert(Atom::Acceleration(*p), value);
         }
-        self.outputs.evaluate(&point)
+        outputs.evaluate(&point)
     }
 }
 
@@ -156,6 +167,30 @@ pub(super) struct SampledRegressor {
 }
 
 impl SampledRegressor {
+    /// What evaluates some columns only.
+    pub(super) fn evaluation_of(&self, columns: &[usize]) -> ColumnEvaluation {
+        let drives = 0..self.sampler.n_drives;
+        let outputs: Vec<usize> = drives
+            .flat_map(|drive| columns.iter().map(move |column| drive * self.n_columns + column))
+            .collect();
+        ColumnEvaluation {
+            tape: self.sampler.outputs.restricted_to(&outputs),
+            n_columns: columns.len(),
+        }
+    }
+
+    /// Rows of H at one random point, with some columns only.
+    pub(super) fn draw_rows_of<const P: u64>(
+        &self,
+        evaluation: &ColumnEvaluation,
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
+    ) -> Result<Vec<Vec<FieldElement<P>>>, DeriveError> {
+        let values = self.sampler.draw_of(&evaluation.tape, constants, stream)?;
+        let rows = values.chunks(evaluation.n_columns.max(1));
+        Ok(rows.map(<[FieldElement<P>]>::to_vec).collect())
+    }
+
     /// The rows of H at one random point, one per drive and part of the numbers.
     pub(super) fn draw_rows<const P: u64>(
         &self,
@@ -191,6 +226,14 @@ impl SampledRegressor {
         }
         Ok((echelon, n_points))
     }
+}
+
+/// Evaluates some of a regressor's columns, drive by drive.
+pub(super) struct ColumnEvaluation {
+    /// What the columns need.
+    tape: EvaluationTape,
+    /// Number of these columns.
+    n_columns: usize,
 }
 
 /// Prepares the evaluation of `n_columns` columns, given drive by drive.

@@ -123,7 +123,11 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     line.push(name("h"));
     line.push(text(" of "));
     line.push(name("H"));
-    line.push(text(" belongs to one product."));
+    // Pages of all mechanisms use the numbers of the paper with which the project started.
+    line.push(text(
+        " belongs to one product. Equation numbers 5, 6, 9 and 16 are those of the paper Dynamic Modeling and \
+         Identification of a Complex-structured Parallel Robot, about the robot SpiderMill.",
+    ));
     page.paragraph(line);
     // Nominal values of single parameters; the value of a product follows from them.
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
@@ -200,7 +204,7 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
              In the span of the other columns, every retained column has a residual of at least {least_kept:.1e} of its size, \
              every dependent one of at most {most_dropped:.1e}. \
              At further states the residual of eq. (6) is at most {residual:.1e} of a column. \
-             So the dependences were verified to {} digits and not proved{}.",
+             So the dependencies were verified to {} digits and not proved{}.",
             n_verified_digits(*most_dropped),
             constant_change.map_or_else(String::new, |change| format!("; {}", constant_change_text(change))),
         ),
@@ -258,7 +262,9 @@ pub(super) fn base_parameters(page: &mut PageDocument, derivation: &Derivation, 
             n.samples, n.rank
         )));
         if let Some(condition) = n.condition {
-            line.push(text(format!(" The condition number is {condition:.3}.")));
+            line.push(text(format!(
+                " The condition number over these states is {condition:.3}; that along a recording differs."
+            )));
         }
     }
     page.paragraph(line);

@@ -1,6 +1,6 @@
 //! The section of effects: a table of their places and of the force that each adds.
 
-use modelmill_spec::{DriveKind, EffectPlace, Mechanism, ModelEffect};
+use modelmill_spec::{DriveKind, EffectPlace, Mechanism, ModelEffect, ModelSymbol, PlaceQuantity};
 
 use super::document::{InlineSpan, PageDocument, PageTable, TextLine, cell, code, text};
 use crate::expr::Rational;
@@ -27,20 +27,14 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
     let other = free(OTHER, "x_of_the_other_place");
     // How the table is read.
     page.heading("Effects");
-    page.paragraph([
-        text("Each effect adds a force at its place. The name of a linear drive stands for its length, "),
-        code("load"),
-        text(" for the force that the place transmits. If an effect acts at several places, "),
-        InlineSpan::Math(PrintedFormula::name(&*each)),
-        text(" stands for the coordinate of each of them. At a point the parameter is a mass."),
-    ]);
+    page.paragraph(introduction(mechanism, &each));
     // An effect with a fixed `other` names that place in its row; only the others need a symbol for it.
     let is_coupled = |effect: &ModelEffect| {
         let mut terms = effect.terms.iter();
         effect.other.is_none()
             && terms.any(|term| {
                 term.expression
-                    .mentions(&|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()))
+                    .mentions(&|symbol| matches!(symbol, ModelSymbol::Place(q) if q.is_other()))
             })
     };
     if mechanism.effects.iter().any(is_coupled) {
@@ -77,6 +71,38 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         .collect();
     let head = vec!["effect", "at", "adds"];
     page.table("effects", PageTable { head, rows });
+}
+
+/// How the table is read. Only symbols that the table contains are explained; `each` is the one for the coordinate of
+/// an effect with several places.
+fn introduction(mechanism: &Mechanism, each: &str) -> TextLine {
+    // Effects with mechanics are described in words, without these symbols.
+    let by_expression = || mechanism.effects.iter().filter(|effect| effect.mechanics.is_none());
+    let mentions = |effect: &ModelEffect, is_wanted: &dyn Fn(PlaceQuantity) -> bool| {
+        let is_place = |symbol: ModelSymbol| matches!(symbol, ModelSymbol::Place(quantity) if is_wanted(quantity));
+        effect.terms.iter().any(|term| term.expression.mentions(&is_place))
+    };
+    let is_motion = |quantity: PlaceQuantity| quantity != PlaceQuantity::Load && !quantity.is_other();
+    let mut line = vec![text("Each effect adds a force at its place.")];
+    let mut drives = mechanism.drives.iter();
+    if drives.any(|drive| matches!(drive.kind, DriveKind::Linear { .. })) {
+        line.push(text(" The name of a linear drive stands for its length."));
+    }
+    if by_expression().any(|effect| mentions(effect, &|quantity| quantity == PlaceQuantity::Load)) {
+        line.push(text(" The symbol "));
+        line.push(code("load"));
+        line.push(text(" stands for the force that the place transmits."));
+    }
+    if by_expression().any(|effect| effect.places.len() > 1 && mentions(effect, &is_motion)) {
+        line.push(text(" If an effect acts at several places, "));
+        line.push(InlineSpan::Math(PrintedFormula::name(each)));
+        line.push(text(" stands for the coordinate of each of them."));
+    }
+    let is_at_point = |effect: &ModelEffect| effect.places.iter().any(|place| matches!(place, EffectPlace::Point(_)));
+    if by_expression().any(is_at_point) {
+        line.push(text(" At a point, the parameter is a mass."));
+    }
+    line
 }
 
 /// The contribution of an effect to the force: a sum of parameter times expression, or a text if it is a piece of

@@ -48,7 +48,7 @@ impl ControlState {
 pub(crate) struct TorqueController<'a>(Box<ControlLaw<'a>>);
 
 /// Forces of the spindles, N, for the measured and desired motion.
-type ControlLaw<'a> = dyn Fn(&ControlState) -> Result<[f64; 2], PoseError> + 'a;
+type ControlLaw<'a> = dyn Fn(&ControlState) -> Result<[f64; 2], PoseError> + Sync + 'a;
 
 impl<'a> TorqueController<'a> {
     /// Without a model: it uses the effective inertia of each crank, and the weight, at one pose only.

@@ -51,13 +51,24 @@ fn report(rig: &modelmill_rig::Rig, task: &ReferenceMotion) -> Result<Vec<String
     let identified = TorqueController::with_identified(&known);
 
     let mut lines = vec!["root mean square of the tracking error, mrad        theta1    theta2".to_owned()];
-    // All controllers follow the same task on the same plant.
-    for (name, controller) in [
+    let controllers = [
         ("without the model (constant gains per drive)", &without),
         ("computed torque, nominal parameters", &with),
         ("computed torque, identified", &identified),
-    ] {
-        let [first, second] = run(rig, controller, task)?.rms_error().map(|e| 1e3 * e);
+    ];
+    // All controllers follow the same task on the same plant, each on a thread of its own.
+    let runs: Vec<Result<[f64; 2], String>> = std::thread::scope(|scope| {
+        let threads = controllers.map(|(_, controller)| {
+            scope.spawn(move || match run(rig, controller, task) {
+                Ok(recording) => Ok(recording.rms_error()),
+                Err(error) => Err(error.to_string()),
+            })
+        });
+        let joined = threads.map(|thread| thread.join().unwrap_or_else(|_| Err("a simulation panicked".to_owned())));
+        joined.into()
+    });
+    for ((name, _), error) in controllers.iter().zip(runs) {
+        let [first, second] = error?.map(|e| 1e3 * e);
         lines.push(format!("  {name:<46} {first:>9.3} {second:>9.3}"));
     }
     Ok(lines)

@@ -152,8 +152,8 @@ pub struct IdentifiedEffect {
     pub support: EffectSupport,
     /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
-    /// Other places whose value the model uses here too; the effect is then the difference from that value. Empty if
-    /// the model has no such effect here. The caller, who knows the model, sets it.
+    /// Other places that share one value with this place in the model file; the estimates are then differences from the
+    /// shared value. Empty if the model has no such effect here. The caller, who knows the model, sets it.
     pub shared_with: Vec<String>,
     /// Whether it was measured in the positions instead of estimated from the forces; the errors of the steps are then
     /// those without it. The caller sets it.
@@ -189,8 +189,9 @@ pub struct ModelDiagnosis {
     pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
     pub effects: Vec<IdentifiedEffect>,
-    /// Effects that are less likely than not, which the model is not said to lack: with a probability below 0.5. They
-    /// are in no set whose error is reported last, and their estimates belong to the set that had them.
+    /// Effects that are less likely than not: with a probability below 0.5. They do not count as missing. The last set of
+    /// effects does not contain them, so the errors of the last step are those without them. Their estimates are those of
+    /// an earlier set that contained them.
     pub possible_effects: Vec<IdentifiedEffect>,
     /// All candidates: first those that were found, then by the share that they explain alone.
     pub candidates: Vec<CandidateOutcome>,

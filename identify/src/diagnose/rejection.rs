@@ -29,9 +29,9 @@ pub enum RejectionReason {
     NotConfirmedByValidation,
     /// The error does not fall in cross-validation.
     NotConfirmedByFolds,
-    /// The gain is below the least that counts.
+    /// The gain is below the minimum gain.
     GainTooSmall,
-    /// The gain does not pay for the number of parameters.
+    /// The gain is too small for the number of parameters (Bayesian information criterion, BIC).
     TooManyParameters,
     /// Its columns depend linearly on those of the model.
     LinearlyDependent,

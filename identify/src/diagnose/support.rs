@@ -27,7 +27,7 @@ pub struct EffectSupport {
     pub gain: f64,
     /// How steady the gain is over the blocks of time: its mean divided by its standard error.
     pub t: f64,
-    /// Repeatable squares that stay unexplained on its drives, relative to those that it explains.
+    /// Repeatable squared error that remains on its drives, divided by the squared error that it explains there.
     pub unexplained: f64,
     /// Whether the residual of its drives is white noise: then a small gain is as certain as a large one.
     pub white_residual: bool,

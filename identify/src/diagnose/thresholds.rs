@@ -243,7 +243,7 @@ pub(super) const SUPPORT_GAIN_RANGE: [f64; 2] = [0.005, 1.0];
 /// Largest probability of an effect: no data exclude a cause that is no candidate (1). By judgement.
 pub(super) const PROBABILITY_MOST: f64 = 0.99;
 
-/// Below this probability an effect is possible, and the model is not said to lack it alone (1). By definition.
+/// Below this probability an effect is possible and does not count as missing by itself (1). By definition.
 pub const LACKING_LEAST_PROBABILITY: f64 = 0.5;
 
 /// A column whose share of squares outside of the others is below this (1) is a combination of them along any motion,

@@ -45,7 +45,8 @@ pub struct ErrorFigures {
     /// Figures after the same low-pass on measured and model force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<FilteredFigures>,
-    /// Figures of the rows of the fit, if these are not the samples: after the parallel filter and decimation.
+    /// Figures of the equations (rows) that the fit used, if these are not all samples: after the low-pass on regressor
+    /// and forces, and after decimation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<FilteredFigures>,
 }

@@ -33,7 +33,7 @@ pub(crate) struct DiagnosisAnswer {
     pub(crate) effects: Vec<MissingEffectAnswer>,
     /// Errors of the geometry that explain as much as the effects found.
     pub(crate) geometry_alternatives: Vec<GeometryAlternativeAnswer>,
-    /// Effects with a probability below 0.5, which the model is not said to lack.
+    /// Effects with a probability below 0.5, which do not count as missing.
     pub(crate) possible: Vec<MissingEffectAnswer>,
     /// All effects that were tried.
     pub(crate) candidates: Vec<CandidateAnswer>,
@@ -150,7 +150,7 @@ pub(crate) struct MissingEffectAnswer {
     pub(crate) support: EffectSupport,
     /// Effects that explain the recordings equally well.
     pub(crate) indistinguishable_from: Vec<LocatedEffect>,
-    /// Places whose value the model uses here too: the estimates are the difference from that value.
+    /// Other places that share one value with this place; the estimates are then differences from this value.
     pub(crate) shared_with: Vec<String>,
     /// An experiment that would separate it from its alternatives, as a sentence.
     pub(crate) separate_by: Option<String>,

@@ -106,16 +106,16 @@ pub struct DiagnosisFindings {
     /// [`DiagnosisVerdict::Unexplained`], the error is the residual of the unexplained drives. Otherwise it is the
     /// error of the given model, as in `places`.
     pub regions: Vec<ErrorRegion>,
-    /// The given model, without added effects, along all recordings.
+    /// The given model, without added effects: its fit, and its forces along all recordings.
     pub before: ModelVersion,
-    /// The model with the effects found, or the reason why there is none.
+    /// The same for the model with the effects found (the model of the file `edited`), or the reason why there is none.
     pub after: ModelCompletion,
     /// The effects found, as entries of a model file. Effects that a model file cannot contain have no entry.
     pub entries: Vec<NewEffect>,
-    /// The model file with these entries; `None` if there are none or they cannot be added.
+    /// The text of the given model file with these entries added; `None` if there are none or they cannot be added.
     pub edited: Option<CompletedModelFile>,
-    /// Ranges of a variable in which the given model has a large error: their share of the squared error is larger than
-    /// their share of the samples.
+    /// Where the error of the given model is large: ranges of a coordinate, rate, load or time, not places of the
+    /// mechanism. Their share of the squared error is larger than their share of the samples.
     pub places: ErrorLocations,
     /// The same for the model with the effects found; `None` if there is no such model.
     pub residual_locations: Option<ErrorLocations>,
@@ -147,8 +147,8 @@ pub struct MissingEffect {
     pub support: EffectSupport,
     /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
-    /// Other places whose value the model uses here too: the estimates are the difference from that value. Empty if the
-    /// model has no such effect here.
+    /// Other places that share one value with this place in the model file. Estimates are then differences from the
+    /// shared value. Empty if the model file has no such effect here.
     pub shared_with: Vec<String>,
     /// Experiment that distinguishes the effect from its alternatives, as described in the effect library. `None` if
     /// there are no alternatives, or the library describes no experiment.
@@ -174,7 +174,8 @@ pub struct UndecidedEffect {
 pub struct SeparationProposal {
     /// The effect found, with the values of its parameters and constants.
     pub effect: NamedEffect,
-    /// Its alternatives: effects that explain the recordings equally well.
+    /// Its alternatives: those in [`MissingEffect::indistinguishable_from`] whose forces along another motion can be
+    /// computed.
     pub rivals: Vec<LocatedEffect>,
     /// The other effects found, with their constants. They are assumed to be present in both cases: if this effect is
     /// the true one, and if one of its alternatives is.
@@ -605,7 +606,7 @@ fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     regions
 }
 
-/// The whole time as a region, for a drive whose residual is largest nowhere in particular.
+/// All of the time as a region, for a drive whose residual is largest nowhere in particular.
 fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     let name = findings.answer.problem.layout.channels[channel].clone();
     let version = findings.final_version();
@@ -617,7 +618,7 @@ fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     let again = 100.0 * findings.answer.diagnosis.repeatable_share[channel];
     ErrorRegion {
         says: format!(
-            "the residual of {name} is spread over the whole time, and {again:.0} % of its square is repeatable"
+            "the residual of {name} is spread over the complete recording, and {again:.0} % of its square is repeatable"
         ),
         channel: name,
         variable: modelmill_identify::TIME_COLUMN.to_owned(),

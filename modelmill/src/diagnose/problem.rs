@@ -49,7 +49,8 @@ use crate::regressors::{SegmentList, regressor};
 pub enum FixedParameters {
     /// Only those that are known: they contain no dynamic parameter, see [`Model::is_known`].
     Known,
-    /// All base parameters. Values of a fit with a covariance are a prior instead, see [`Model::with_fit`].
+    /// All base parameters, with one exception: if the values of the model come from a fit with a covariance
+    /// ([`Model::with_fit`]), they are not fixed but estimated, with values and covariance of the fit as a prior.
     All,
 }
 

@@ -49,9 +49,14 @@ impl ValidationMethod {
     }
 }
 
-/// The name of a kind in words: `coulomb friction` for `coulomb_friction`.
+/// The name of a kind in words: `coulomb friction` for `coulomb_friction`. Two names of the library need a
+/// description.
 pub fn kind(name: &str) -> String {
-    name.replace('_', " ")
+    match name {
+        "two_point_element" => "spring or damper between two points".to_owned(),
+        "untied_part" => "separate parameters of one part".to_owned(),
+        _ => name.replace('_', " "),
+    }
 }
 
 /// A kind with its places: `coulomb friction (a, b)`.
@@ -187,12 +192,14 @@ fn is_rounding(noise_floor: f64) -> bool {
     noise_floor <= NOISE_FREE_ROUNDINGS * FORCE_ROUNDING
 }
 
-/// The noise floor as a sentence; errors are compared with it.
+/// The noise floor as a sentence; errors are compared with it. It is the rms value over all recordings of the
+/// part of the residual that is noise.
 pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     // Errors are compared with this figure.
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
-        format!("The forces are noise-free: errors below {floor} are rounding.")
+        // The figure is of all recordings together, so the error of one of them may be larger.
+        format!("The forces are noise-free: rounding causes an error of {floor} (rms over all recordings).")
     } else {
         format!("The noise is {floor} of the force.")
     }
@@ -218,15 +225,16 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
             "its value would be implausible for the size and the forces of this machine"
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
-        RejectionReason::ExplainedBetter => "another candidate explains more",
+        RejectionReason::ExplainedBetter if has_findings => {
+            "explains less of the remaining error than another candidate"
+        }
+        RejectionReason::ExplainedBetter => "explains less of the error than another candidate",
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
-        RejectionReason::ExplainsNothing if has_findings => {
-            "redundant: it explains almost nothing in addition to the effects found"
-        }
+        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing in addition to the effects found",
         RejectionReason::ExplainsNothing => "explains almost none of the error",
-        RejectionReason::OnlyNoiseRemains => "only noise is left to explain",
+        RejectionReason::OnlyNoiseRemains => "only noise remains",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
         RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",
         RejectionReason::GainTooSmall => "the gain is too small to matter",

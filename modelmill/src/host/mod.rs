@@ -127,8 +127,8 @@ impl Host {
     /// Sets whether constants are replaced by their numeric values before the derivation
     /// ([`modelmill_spec::Mechanism::with_numeric_constants`]).
     ///
-    /// If they are replaced, the model is valid for this geometry only. Special geometry can reduce the number of base
-    /// parameters, and generated code has no geometric constants as inputs.
+    /// If they are replaced, the model is valid only for the values of its file. Fewer base parameters may remain, for
+    /// example if lengths are zero or equal. Generated code then has no inputs for lengths and angles of the geometry.
     #[must_use]
     pub fn at_values(mut self, is_wanted: bool) -> Self {
         self.is_at_values = is_wanted;

@@ -1,4 +1,4 @@
-//! `identify`: base parameters from recordings by least squares, eq. (12), with standard deviations and error metrics
+//! `identify`: base parameters from recordings by least squares, eq. (12), with standard deviations and error figures
 //! (such as the NRMS).
 
 mod influence;
@@ -35,17 +35,19 @@ pub use refine::{EstimateRefinement, RefinementResult};
 use regression::{InstrumentStatistics, RegressionEstimate};
 use thresholds::{IMPOSSIBLE_SIGN_SIGMAS, WEAK_INSTRUMENT_CORRELATION};
 
-/// A fit, with the error metrics of the nominal parameters on the same recordings.
+/// A fit, with the error figures of the nominal parameters on the same recordings.
 pub struct Identification {
-    /// The fit: the contents of a fit file.
+    /// The result as `identify` writes it to a fit file: values and standard deviations of all base parameters, error
+    /// figures and notes.
     pub fit: FitFile,
-    /// Error metrics of the nominal parameters on the recordings of the fit.
+    /// Error figures of the nominal parameters on the recordings of the fit.
     pub nominal_fit: ErrorFigures,
-    /// Error metrics of the nominal parameters on the validation runs; `None` if there are none.
+    /// Error figures of the nominal parameters on the validation runs; `None` if there are none.
     pub nominal_check: Option<ErrorFigures>,
     /// The suspected fault of the first recording that has one: until it is corrected, all values are doubtful.
     pub suspect: Option<SuspectedFault>,
-    /// The solution of the least-squares problem, with its statistics.
+    /// The solution of the least-squares problem from which `fit` was written: only the estimated parameters, with their
+    /// covariance and further statistics.
     pub found: RegressionEstimate,
     /// The options of the estimator, with automatic weights replaced by the chosen ones.
     pub options: EstimatorOptions,
@@ -180,9 +182,9 @@ pub fn identify(
     let notes = remarks(model, &found, &parameters);
     let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
-    // Fit and validation use one band, so that their error metrics can be compared.
+    // Fit and validation use one band, so that their error figures can be compared.
     let band = compare::band(data);
-    // Error metrics of identified and nominal values, on fit and validation runs.
+    // Error figures of identified and nominal values, on fit and validation runs.
     let (fit, nominal_fit) = both_figures(model, data, &values, band)?;
     let recordings = data.iter().chain(check);
     let repeats = recordings
@@ -368,7 +370,7 @@ fn undetermined_text(p: &FitParameter) -> String {
     }
 }
 
-/// Error metrics with identified and with nominal values, over all samples and over the rows of the fit.
+/// Error figures with identified and with nominal values, over all samples and over the rows of the fit.
 fn both_figures(
     model: &Model,
     data: &[RecordingSegment],

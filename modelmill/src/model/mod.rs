@@ -45,7 +45,7 @@ pub use values::BaseParameterValues;
 pub struct Model {
     /// The file's name without folder and extension; also the name of the model in the JSON.
     pub name: String,
-    /// Name of the file in messages.
+    /// Path of the file as it was given, for messages; the given name for a model that was read from text.
     pub path: String,
     /// The contents of the file.
     pub loaded: Arc<LoadedModel>,
@@ -54,8 +54,9 @@ pub struct Model {
     pub derivation: Arc<Derivation>,
     /// The base parameters, eq. (16), with names, expressions and units.
     pub base: Vec<BaseParameterEntry>,
-    /// The current values of the base parameters, in their units and in the order of `base`. Each is computed from the
-    /// nominal values of the file, unless the file or a fit provides an identified value, see [`Model::is_identified`].
+    /// The current values of the base parameters, in their units and in the order of `base`. They are nominal values
+    /// only if nothing was identified: a value that the file or a fit provides ([`Model::with_fit`]) replaces the one
+    /// computed from the nominal values of the file, see [`Model::is_identified`].
     pub nominal: Vec<f64>,
     /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
     pub notes: Vec<RecordingNote>,
@@ -381,7 +382,7 @@ impl Model {
     }
 
     /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
-    /// an effect. The retained product is the product of parameters whose regressor column was kept for this base
+    /// an effect. Of several dependent regressor columns, the column of the retained product was kept for this base
     /// parameter.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;

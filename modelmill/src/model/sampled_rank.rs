@@ -121,7 +121,7 @@ pub(crate) fn judge_rank(model: &Model) -> Outcome<RankJudgement> {
     let found = match model.host().run_job(&message, 0, |_| sampled_rank(model))? {
         Ok(found) => found,
         Err(reason) => {
-            let says = format!("the numeric rank of eq. (9) was not found: {reason}");
+            let says = format!("the numeric rank of the regressor was not found: {reason}");
             return Ok(RankJudgement {
                 found: None,
                 warnings: vec![says],

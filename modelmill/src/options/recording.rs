@@ -70,8 +70,9 @@ const DECLARATIONS: &[OptionDeclaration<RecordingOptions>] = &[
         name: "decimate",
         flag: "decimate",
         placeholder: "N",
-        help: "Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. With 1, the default, n is \
-               chosen together with the cut-off; with {cutoff_hz} or {smoothing}, 1 keeps all samples",
+        help: "Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. Default: n is chosen \
+               together with the cut-off, and all samples are kept if {cutoff_hz} or {smoothing} is given; 1 is the same as \
+               the default",
         excludes: &[],
         kind: OptionKind::Integer {
             set: |options, factor| options.preparation.decimate = factor,

@@ -87,14 +87,14 @@ impl ModelChanges {
         // Numbers of products of both models.
         let n = |model: &Model| model.derivation.reduction.products.len();
         section(
-            &format!("p_g, eq. (5): {} -> {} products", n(before), n(after)),
+            &format!("p_g: {} -> {} products of parameters", n(before), n(after)),
             "no change",
             &self.products,
         );
-        section("dependencies, eq. (6)", "no change", &self.dependencies);
+        section("dependencies of regressor columns", "no change", &self.dependencies);
         section(
             &format!(
-                "p_min, eq. (16), by retained product: {} -> {}",
+                "p_min: {} -> {} base parameters, by retained product",
                 before.base.len(),
                 after.base.len()
             ),

@@ -274,7 +274,9 @@ impl DiagnosisFindings {
             }
         }
         lines.push(String::new());
-        lines.push(style.bold("Remaining error of each drive, % of its force (rms)"));
+        lines.push(
+            style.bold("Remaining error (rms) of each drive, and disturbances subtracted before, % of its force"),
+        );
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
@@ -297,7 +299,7 @@ impl DiagnosisFindings {
                 ("noise or rounding", ColumnAlignment::Right),
                 ("varies with time", ColumnAlignment::Right),
                 ("repeatable, unexplained", ColumnAlignment::Right),
-                ("disturbances (subtracted)", ColumnAlignment::Right),
+                ("subtracted disturbances", ColumnAlignment::Right),
             ],
             &rows,
         ));
@@ -330,7 +332,8 @@ impl DiagnosisFindings {
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
             let meaning = kind.map_or_else(|| words::meaning(&found.effect.kind), |kind| Some(kind.says.as_str()));
             if let Some(meaning) = meaning.filter(|_| is_first) {
-                lines.push(style.dim(&format!("    {meaning}")));
+                let wrapped = wrap_words(meaning, 96);
+                lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
             }
             if !found.shared_with.is_empty() {
                 let says = words::shared_value(&found.effect, &found.shared_with);
@@ -424,12 +427,12 @@ impl DiagnosisFindings {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Rejected candidates"));
+        lines.push(style.bold("Rejected candidates, with the share of the squared error that each explains alone"));
         lines.extend(table(
             2,
             &[
                 ("candidate", ColumnAlignment::Left),
-                ("alone it would explain", ColumnAlignment::Right),
+                ("explained alone", ColumnAlignment::Right),
                 ("rejected because", ColumnAlignment::Left),
             ],
             &rows,

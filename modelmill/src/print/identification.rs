@@ -66,7 +66,7 @@ impl Identification {
         lines.push(String::new());
         // The condition number shows whether the motion excites all parameters.
         lines.push(format!(
-            "  condition number {} ({} after scaling the columns to equal norm; below 100 is good)",
+            "  condition number along the recordings {} ({} after scaling the columns to equal norm; below 100 is good)",
             fit.condition_number
                 .map_or_else(|| "infinite".to_owned(), |value| significant(value, 4)),
             fit.scaled_condition_number

@@ -15,7 +15,7 @@ pub struct RecordingOptions {
     pub preparation: StatePreparation,
     /// Whether to leave out samples with NaN, infinite or empty fields. If not, such a recording is refused.
     pub skip_bad_samples: bool,
-    /// Whether to exclude contacts and pushes from fits and error metrics. These are intervals in which forces act that
+    /// Whether to exclude contacts and pushes from fits and error figures. These are intervals in which forces act that
     /// no parameters explain.
     pub leave_out_events: bool,
     /// Read only the samples between these times, s.

@@ -143,7 +143,7 @@ fn expressions(model: &Model) -> String {
         })
         .collect();
     format!(
-        "<details><summary>Base parameters, eq. (16)</summary>\n{}</details>\n",
+        "<details><summary>Base parameters</summary>\n{}</details>\n",
         table("", &["p_min", "expression", "#value", "unit"], &rows),
     )
 }

@@ -133,9 +133,11 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
          tested {}. <i>t value of the decrease</i>: the mean decrease of the squared error over blocks of time, divided by its \
-         standard error. <i>effective samples</i>: the number of independent samples with as much information as the correlated \
-         residuals. <i>noise of the force</i>: an upper bound from the differences of successive samples. The standard deviations \
-         of the missing effects are computed with this noise, or with the residual if that is larger.</p>\n{}",
+         standard error. <i>effective samples</i>: the number of independent samples equivalent to these correlated samples. \
+         <i>noise of the force</i>: an upper bound of the force noise, computed from differences of successive samples; the true \
+         noise may be zero. The standard deviations of the missing effects are computed with this noise, or with the residual if \
+         that is larger. The noise or rounding in the picture and in the summary is an rms value over all recordings together, \
+         so the error on one of them may be larger.</p>\n{}",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),
@@ -335,9 +337,10 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
 fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
         "<p>The table lists every kind of effect and disturbance at every place (drive, joint, point, body) where it can act. \
-         <i>alone it would explain</i>: the share of the squared error that the candidate would remove without any other effect. \
-         <i>gain in addition to the effects found</i>: the share of the squared residual with these effects that the candidate \
-         would remove. For an effect that was found, the residual is that with the other effects.\
+         <i>squared error explained if added alone</i>: the share of the squared error of the given model that the candidate \
+         removes without any other effect. <i>gain in addition to the effects found</i>: the share of the squared residual of the \
+         model with these effects that the candidate removes. For a found effect, the reference is the model with all other found \
+         effects.\
          <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )
@@ -351,7 +354,13 @@ fn parameters(findings: &DiagnosisFindings) -> String {
     let mut html = String::new();
     match findings.after.version() {
         Some(after) => {
-            html.push_str("<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations allow for residuals that are correlated in time.</p>\n");
+            html.push_str(
+                "<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive \
+                 are divided by the standard deviation of its residual. The standard deviations of the parameters are computed \
+                 from the residual alone, and allow for its correlation in time. Those of the missing effects are computed from \
+                 the residual or from the noise of the force, whichever is larger. So one quantity may have two standard \
+                 deviations.</p>\n",
+            );
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
                 html,
@@ -360,7 +369,11 @@ fn parameters(findings: &DiagnosisFindings) -> String {
             );
         }
         None => {
-            html.push_str("<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations allow for residuals that are correlated in time.</p>\n");
+            html.push_str(
+                "<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard \
+                 deviation of its residual. The standard deviations of the parameters are computed from the residual alone, and \
+                 allow for its correlation in time.</p>\n",
+            );
             html.push_str(&tables::parameters(&findings.before));
         }
     }
@@ -388,6 +401,6 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
         "The model"
     };
     format!(
-        "<details class=\"embedded\">\n<summary>{what}: derivation, p_g, dependences, p_min, programs</summary>\n{inner}</details>\n",
+        "<details class=\"embedded\">\n<summary>{what}: derivation, p_g, dependencies, p_min, programs</summary>\n{inner}</details>\n",
     )
 }

@@ -252,7 +252,7 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
     let head = [
         "kind",
         "places",
-        "#alone it would explain",
+        "#squared error explained if added alone",
         "#gain in addition to the effects found",
         "result",
     ];

@@ -57,7 +57,8 @@ pub(super) fn check_effects(
         }];
     }
     let failed = |one: &MissingEffect| VerificationCheck {
-        at: words::effect(&one.effect),
+        // Scripts compare this name, so it is that of the library.
+        at: format!("{} ({})", one.effect.kind.replace('_', " "), one.effect.at.join(", ")),
         state: CheckState::Fail,
         value: Some(one.probability),
         says: format!(

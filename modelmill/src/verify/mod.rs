@@ -1,5 +1,5 @@
-//! `verify`: tests a model against recordings. A model, recordings and limits go in; checks with the states pass,
-//! fail and not evaluated come out, each failure with its cause from the diagnosis.
+//! `verify`: tests a model against recordings. A model, recordings and limits go in; checks with the results
+//! pass, fail and not evaluated come out, each failure with its cause from the diagnosis.
 //!
 //! The modules, in the order of the data flow: `limits` reads limits, `recordings`, `drives`, `parameters` and
 //! `effects` make the checks of their scopes, `causes` explains failures, `fingerprints` states which files were

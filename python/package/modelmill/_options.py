@@ -31,8 +31,8 @@ class ReadingOptions(TypedDict, total=False):
         Samples dropped at the start and at the end, after derivatives are computed; a single number applies to both
         ends.
     decimate : int
-        Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. With 1, the default, n is
-        chosen together with the cut-off; with cutoff_hz or smoothing, 1 keeps all samples.
+        Keep every n-th sample, after an anti-aliasing low-pass on forces and regressor. Default: n is chosen together
+        with the cut-off, and all samples are kept if cutoff_hz or smoothing is given; 1 is the same as the default.
     source : {"recorded", "positions"}
         Source of rates and accelerations. "recorded": Recorded columns if the file has them; the others are computed
         from positions. "positions": All computed from positions, even if the file has columns for them.

@@ -329,7 +329,7 @@ class Diagnosis(Result):
 
     @property
     def possible(self) -> list[Effect]:
-        """Effects with a probability below 0.5; the model is not said to lack them."""
+        """Effects with a probability below 0.5, which do not count as missing."""
         return [
             _effect(one)
             for one in self._object.get("possible", [])

@@ -91,6 +91,47 @@ fn crates_without_a_test_program_have_no_unit_tests() {
     }
 }
 
+/// Whether the documentation of a library holds code that `rustdoc` would run.
+fn has_documented_examples(folder: &Path) -> bool {
+    let opens_code = |line: &str| {
+        let comment = line.trim_start().strip_prefix("///").or(line.trim_start().strip_prefix("//!"));
+        let language = comment.and_then(|comment| comment.trim_start().strip_prefix("```"));
+        language.is_some_and(|language| !["text", "sql", "toml", "sh", "json"].contains(&language.trim()))
+    };
+    (files(&folder.join("src"), "rs").iter()).any(|file| {
+        let text = text(file);
+        // The same line closes a block, so blocks of another language are passed over as a whole.
+        let mut is_open = false;
+        text.lines().any(|line| {
+            let is_fence = line.trim_start().trim_start_matches(['/', '!']).trim_start().starts_with("```");
+            let is_comment = line.trim_start().starts_with("//");
+            if !(is_fence && is_comment) {
+                return false;
+            }
+            is_open = !is_open;
+            is_open && opens_code(line)
+        })
+    })
+}
+
+/// `rustdoc` reads a whole library to find its examples: where there are none, its manifest says so, and only there.
+#[test]
+fn documentation_is_tested_where_it_has_examples() {
+    let libraries: Vec<(PathBuf, String)> = (members().into_iter())
+        .filter(|(folder, _)| folder.join("src/lib.rs").exists())
+        .collect();
+    assert!(libraries.len() > 15, "{} libraries", libraries.len());
+    for (folder, manifest) in &libraries {
+        let is_untested = manifest.contains("\ndoctest = false\n");
+        assert_eq!(
+            is_untested,
+            !has_documented_examples(folder),
+            "{}: `doctest = false` belongs into the manifests of libraries without examples, and of no other",
+            folder.display()
+        );
+    }
+}
+
 /// They are copies, since not every system that checks a repository out knows links.
 #[test]
 fn licences_are_those_of_the_project() {

@@ -49,7 +49,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     let flags = place.flags(&WITH_RODS);
     // Base parameters are estimated, as a user would do with an unknown machine.
     let rods = diagnose(&model, &runs, FixedParameters::Known)?;
-    story.diagnose(&place, &rods);
+    story.diagnose(&place, &seen, &rods);
     let edited = place.add(&rods, &flags)?;
     story.add(&place, edited.as_ref());
     story.steps(&rods);
@@ -158,8 +158,11 @@ impl TourFolder {
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
+        // The bundled recordings show one effect, and the tour keeps the given model file.
+        let target = format!(" --out {}", self.name(EDITED));
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.spell_effect(model, entry)).collect();
+        let commands = commands.map(|entry| flags.spell_effect(model, entry).replace(" --in-place", &target));
+        let commands = commands.collect();
         // File names of the difference, as `diff` prints them.
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);

@@ -75,9 +75,10 @@ impl TourText {
         let reduction = &model.derivation.reduction;
         self.paragraph(&format!(
             "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
-             model file has {}, {} and {}. The forces of the screws are linear in {} of masses, lengths and inertias. Many of \
-             these products always act together. Measurements can determine only {} combinations of them, the base parameters. \
-             modelmill finds these symbolically, in exact arithmetic:",
+             model file has {}, {} and {}. The screws are the drives spindle_left and spindle_right. The angles of the cranks are \
+             theta1 and theta2; those of the couplers, relative to the cranks, are gamma1 and gamma2. The forces of the screws are \
+             linear in {} of masses, lengths and inertias. Many of these products always act together. Measurements can determine \
+             only {} combinations of them, the base parameters. modelmill finds these symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
@@ -130,16 +131,19 @@ impl TourText {
         ));
     }
 
-    /// The missing effect, and the best rejected candidates.
-    pub(super) fn diagnose(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
+    /// The missing effect, and the best rejected candidates. `seen` has the error with nominal parameters.
+    pub(super) fn diagnose(&mut self, place: &TourFolder, seen: &TourComparison, findings: &DiagnosisFindings) {
         self.heading("3  Diagnose: which effect is missing?");
         let all = &findings.diagnosis.candidates;
         self.paragraph(&format!(
-            "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
-             springs, inertias, offsets, delays, rods. It fits sets of candidates, together with the base parameters, to one \
-             recording. It accepts an effect only if the error also falls on a second recording that is not fitted (the \
-             validation run). Here the base parameters are estimated as well. This alone reduces the error of step 2 to {}.",
+            "modelmill tries every effect of its library (`modelmill effects` lists them) at every place of this mechanism: \
+             friction of many kinds, springs, force offsets, inertia of drive rods and others. It also tries errors that are not \
+             in the library: wrong lengths, and faults of signals, such as a drift, a wrong gain or a wrong zero of an encoder. \
+             These are {} in all. modelmill fits sets of candidates, together with the base parameters, to one recording. It \
+             accepts an effect only if the error also falls on a second recording that is not fitted (the validation run). \
+             Estimating the base parameters alone reduces the error of step 2 from {} to {}.",
             count(all.len(), "candidate", "candidates"),
+            percent(seen.compared.figures.nrms),
             percent(findings.diagnosis.steps.first().map(|step| step.check))
         ));
         self.paragraph(&verdict(findings));
@@ -161,9 +165,10 @@ impl TourText {
             .collect();
         let columns = [
             ("candidate", ColumnAlignment::Left),
-            ("alone it would explain", ColumnAlignment::Right),
+            ("explained alone", ColumnAlignment::Right),
             ("result", ColumnAlignment::Left),
         ];
+        self.line("Share of the squared error that each candidate explains if it is added alone:");
         self.lines(&table(2, &columns, &rows));
         self.line("");
         // Each effect is described in the words of its kind, with the effects that explain the data equally well.
@@ -196,7 +201,7 @@ impl TourText {
         self.paragraph(&format!(
             "A few lines in the model file describe the effect. The estimates of its parameters become their nominal values: Jr \
              and Sr are the moment of inertia and the first moment of mass of a rod about its pivot, the same for both screws. \
-             Comments and layout of the file do not change. The tour writes the result to {}:",
+             Comments and layout of the file do not change. The tour writes the result to {}, as the command below does:",
             place.name(EDITED)
         ));
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
@@ -271,7 +276,11 @@ impl TourText {
             }
         }
         self.line("");
-        self.paragraph("Error relative to the force (nrms) on the validation run. The lengths of the bars are on a logarithmic scale.");
+        self.paragraph(&format!(
+            "Error relative to the force (nrms) on the validation run; the last line, {}, is of all recordings together. The \
+             lengths of the bars are on a logarithmic scale.",
+            words::floor_label(noise)
+        ));
     }
 
     /// The diagnosis of the model as published.
@@ -282,8 +291,9 @@ impl TourText {
              masses that replace the coupling elements and the platform, and the contact points of the screws on the cranks. \
              modelmill finds a third cause, in the equations of the paper: they give half of the platform's mass m4 to each \
              coupler. In the balance of forces this half is at the joint between the couplers. In the balance of moments it is at \
-             the coupler's centre of mass. The page docs/experiment.html examines all three causes. The recording is a simulation of the \
-             same robot without rods. The base parameters are fixed at their nominal values (`--held`), as in step 2:",
+             the coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines all three causes. \
+             The recording is a simulation of the same robot without rods. The base parameters are fixed at their nominal values \
+             (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
