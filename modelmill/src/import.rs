@@ -4,7 +4,7 @@ use std::path::Path;
 
 use modelmill_identify::RecordingNote;
 
-pub use modelmill_reduction::{ImportOptions as Options, ImportedJoint};
+pub use modelmill_reduction::{ImportOptions as Options, ImportedJoint, MeshFiles};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
@@ -26,7 +26,7 @@ pub struct ImportedRobot {
 impl Host {
     /// Makes a model file from the text of a URDF, MJCF or SDF. Links behind fixed joints are merged with the body
     /// that carries them, and every body gets its ten linear parameters. `name` is the name of the file in messages;
-    /// if it is a path, files that an MJCF includes are read from the same folder.
+    /// if it is a path, files that an MJCF includes and files of its meshes are read from the same folder.
     ///
     /// Fails when the text is none of these formats, or describes something that a model file cannot express.
     ///
@@ -48,8 +48,13 @@ impl Host {
         };
         let text = modelmill_reduction::expand_includes(text, &read)
             .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
+        let read_mesh = |file: &str| self.read_mesh(Path::new(name), file);
+        let options = Options {
+            meshes: options.meshes.or(Some(MeshFiles(&read_mesh))),
+            ..*options
+        };
         let imported =
-            modelmill_reduction::import(&text, options).map_err(|error| Error::input(format!("{name}: {error}")))?;
+            modelmill_reduction::import(&text, &options).map_err(|error| Error::input(format!("{name}: {error}")))?;
         let facts = imported.facts.into_iter().map(RecordingNote::info);
         let notes: Vec<RecordingNote> = (imported.remarks.into_iter().map(RecordingNote::warning))
             .chain(facts)
@@ -62,5 +67,12 @@ impl Host {
             model: imported.model,
             notes,
         })
+    }
+
+    /// The bytes of a mesh file, whose name is relative to the folder of the description; fails with a sentence.
+    pub(crate) fn read_mesh(&self, description: &Path, file: &str) -> Result<Vec<u8>, String> {
+        let path = description.with_file_name(file);
+        let bytes = self.files().read(&path, modelmill_reduction::LARGEST_MESH);
+        bytes.map_err(|error| format!("{} cannot be read: {}", path.display(), error.fault))
     }
 }

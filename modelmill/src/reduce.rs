@@ -7,7 +7,7 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::RecordingNote;
-use modelmill_reduction::{ImportOptions, LARGEST_DESCRIPTION, PlanarReduction, sampled_forces};
+use modelmill_reduction::{ImportOptions, LARGEST_DESCRIPTION, MeshFiles, PlanarReduction, sampled_forces};
 use modelmill_rig::{LoadedRig, Rig, RigState};
 
 use crate::error::{Error, Outcome};
@@ -172,8 +172,13 @@ impl Host {
         let text = read(path).map_err(Error::input)?;
         let read_included = |file: &str| read(&path.with_file_name(file));
         let text = modelmill_reduction::expand_includes(&text, &read_included).map_err(refuse)?;
-        let made = modelmill_reduction::rig_of_description(&text, &ImportOptions::default())
-            .map_err(|error| refuse(error.to_string()))?;
+        let read_mesh = |file: &str| self.read_mesh(path, file);
+        let options = ImportOptions {
+            meshes: Some(MeshFiles(&read_mesh)),
+            ..ImportOptions::default()
+        };
+        let made =
+            modelmill_reduction::rig_of_description(&text, &options).map_err(|error| refuse(error.to_string()))?;
         // Faults show lines of the rig that was made from the description.
         let loaded = modelmill_rig::load(&path.to_string_lossy(), &made.text, self.files())?;
         Ok((loaded, made.remarks))

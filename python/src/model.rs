@@ -119,6 +119,7 @@ pub(crate) fn import_text(
             pose: &pose,
             locked: &locked,
             kept: kept.as_deref(),
+            meshes: None,
         };
         host.import(name, &text, &options)
     })?;

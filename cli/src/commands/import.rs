@@ -27,6 +27,7 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
         pose: &args.at,
         locked: &args.lock,
         kept: (!args.joints.is_empty()).then_some(args.joints.as_slice()),
+        meshes: None,
     };
     let imported = import_description(host, file, closures.as_deref(), options)?;
     // A `robot.yaml` that was found automatically is mentioned, because it changes the result.

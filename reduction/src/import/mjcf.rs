@@ -13,6 +13,7 @@ use super::description::{
 };
 use super::geoms;
 use super::mjcf_defaults::MjcfDefaults;
+use super::mjcf_meshes::{LoadedMeshes, MeshFiles, MeshFolder};
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
 use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
@@ -52,6 +53,12 @@ pub(super) struct MjcfReader<'a> {
     pub(super) link_of_name: BTreeMap<String, usize>,
     /// Sites: name, link (none is the world) and pose in it.
     pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
+    /// Reads files of meshes; `None` if the description is not a file.
+    pub(super) mesh_files: Option<MeshFiles<'a>>,
+    /// Where files of meshes are.
+    pub(super) mesh_folder: MeshFolder,
+    /// Meshes that were read.
+    pub(super) loaded_meshes: LoadedMeshes,
 }
 
 /// The surroundings of an element.
@@ -64,7 +71,7 @@ struct MjcfContext<'a> {
 }
 
 /// Reads a description; fails with one line that states the fault and its place.
-pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
+pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>) -> Result<RobotDescription, String> {
     let root = document.root_element();
     let mut reader = MjcfReader {
         compiler: compiler(&root)?,
@@ -78,6 +85,9 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         world: Vec::new(),
         link_of_name: BTreeMap::new(),
         sites: Vec::new(),
+        mesh_files,
+        mesh_folder: MeshFolder::read(&root),
+        loaded_meshes: LoadedMeshes::new(),
     };
     // Options: gravity, and forces that the model does not have.
     for option in children(&root, "option") {
@@ -362,7 +372,13 @@ impl<'a> MjcfReader<'a> {
         let parent = around.link.map_or(DescriptionPose::identity(), |link| self.world[link]);
         // Equalities between bodies need the poses in the world.
         self.world.push(parent.compose(&placed));
-        let inertial = self.inertial(node, around.class)?;
+        let inertial = match self.inertial(node, around.class) {
+            // A body that is fixed to the world needs no mass, if the total is not scaled.
+            Err(_) if self.is_fixed(node, around.link) && self.compiler.total_mass.is_none() => {
+                DescriptionInertia::default()
+            }
+            inertial => inertial?,
+        };
         // Properties of simulation and control are reported, since the model lacks them.
         if node.attribute("mocap") == Some("true") {
             self.out.remarks.push(located_message(
@@ -389,6 +405,28 @@ impl<'a> MjcfReader<'a> {
             class: around.class,
         };
         self.read_children(node, inside, DescriptionPose::identity())
+    }
+
+    /// Whether a body cannot move: neither it nor a body that carries it has a joint.
+    fn is_fixed(&self, node: &Node<'a, '_>, parent: Option<usize>) -> bool {
+        let mut waiting = vec![*node];
+        while let Some(node) = waiting.pop() {
+            for child in node.children().filter(Node::is_element) {
+                match child.tag_name().name() {
+                    "joint" | "freejoint" => return false,
+                    "frame" => waiting.push(child),
+                    _ => {}
+                }
+            }
+        }
+        let mut carrier = parent;
+        while let Some(link) = carrier.map(|link| &self.out.links[link]) {
+            if !link.joints.is_empty() {
+                return false;
+            }
+            carrier = link.parent;
+        }
+        true
     }
 
     /// Mass and inertia of a body: its `<inertial>`, or its shapes, with the bounds of the file.
@@ -536,6 +574,18 @@ impl<'a> MjcfReader<'a> {
         };
         let kind = self.text(node, class, "type")?.unwrap_or(usual);
         let mut placed = self.read_placement(node, class)?;
+        if let Some(mesh) = self.text(node, class, "mesh")? {
+            if kind != "mesh" {
+                let says = format!(
+                    "mass and inertia of a {kind} that is fitted to a mesh are not computed here; give the body an <inertial>, \
+                     as MuJoCo writes it (mj_saveLastXML)"
+                );
+                return Err(located_message(node, &says));
+            }
+            let own = self.mesh_inertia(node, mesh, mass, density)?;
+            let at = place.compose(&placed).compose(&own.at);
+            return Ok(Some(DescriptionInertia { at, ..own }));
+        }
         let size = match self.text(node, class, "size")? {
             Some(text) => numbers(node, "size", text)?,
             None => Vec::new(),

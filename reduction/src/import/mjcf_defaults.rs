@@ -116,7 +116,7 @@ fn default_tag<'a>(node: &Node<'a, '_>) -> &'a str {
     match (section, node.tag_name().name()) {
         ("equality" | "tendon" | "actuator", _) => section_defaults(section),
         ("fixed" | "spatial", _) => "",
-        (_, tag @ ("joint" | "geom" | "site")) => tag,
+        (_, tag @ ("joint" | "geom" | "site")) | ("asset", tag @ "mesh") => tag,
         _ => "",
     }
 }

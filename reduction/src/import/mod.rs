@@ -13,11 +13,13 @@ mod couplings;
 mod description;
 mod geoms;
 mod locks;
+mod meshes;
 mod mjcf;
 mod mjcf_actuators;
 mod mjcf_defaults;
 mod mjcf_equalities;
 mod mjcf_include;
+mod mjcf_meshes;
 mod model_text;
 mod placed;
 mod rig_text;
@@ -33,7 +35,8 @@ mod xml;
 mod xml_budget;
 
 pub use mjcf_include::expand_includes;
-pub use thresholds::LARGEST_DESCRIPTION;
+pub use mjcf_meshes::MeshFiles;
+pub use thresholds::{LARGEST_DESCRIPTION, LARGEST_MESH};
 
 use std::fmt;
 
@@ -88,6 +91,8 @@ pub struct Options<'a> {
     /// The joints that move; all others are fixed at the pose of the description, except those that are coupled with
     /// one of these, and ball joints and free joints, which are remarked. Without it all joints move.
     pub kept: Option<&'a [String]>,
+    /// Reads the files of meshes from which an MJCF infers masses; without it such a description is refused.
+    pub meshes: Option<MeshFiles<'a>>,
 }
 
 /// Why a robot description cannot be converted: one sentence with the place.
@@ -181,7 +186,7 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
     counts::check_elements(&document).map_err(ImportError)?;
     let read = match document.root_element().tag_name().name() {
         "robot" => urdf::read(&document, options.closures, options.floating),
-        "mujoco" => mjcf::read(&document),
+        "mujoco" => mjcf::read(&document, options.meshes),
         "sdf" => sdf::read(&document),
         other => Err(xml::located_message(
             &document.root_element(),

@@ -3,6 +3,10 @@
 /// Longest text that is read, bytes. By judgement: the largest published MJCF with meshes in other files has 1 MB.
 pub const LARGEST_DESCRIPTION: usize = 16 << 20;
 
+/// Largest file of a mesh, bytes. MuJoCo reads at most 200 000 triangles from an STL, which are 10 MB; as OBJ they take up
+/// to five times as much.
+pub const LARGEST_MESH: u64 = 64 << 20;
+
 /// Deepest nesting of XML elements. Readers use some kilobytes of the stack per level, and threads have 2 MB: 600
 /// levels overflowed it. Published robots have less than 60 levels.
 pub(super) const DEEPEST_ELEMENT: usize = 200;

@@ -1,6 +1,6 @@
 //! What an importer of MJCF says beside the model it makes.
 
-use modelmill_reduction::{ImportOptions, import};
+use modelmill_reduction::{ImportOptions, MeshFiles, import};
 
 use crate::lines;
 
@@ -201,4 +201,90 @@ fn included_files_stand_in_their_place() {
     let twice = main.replace("more/defaults.xml", "bar.xml");
     let fault = modelmill_reduction::expand_includes(&twice, &read).unwrap_err();
     assert!(fault.contains("included twice"), "{fault}");
+}
+
+/// A body on a hinge whose mass is that of a mesh: the outline of an L, as corners and triangles.
+fn letter(mesh: &str, geom: &str) -> String {
+    format!(
+        "<mujoco model=\"letter\"><compiler meshdir=\"shapes\" strippath=\"true\"/>\
+         <default><mesh scale=\"-2 1 3\"/></default>\
+         <asset>{mesh}</asset>\
+         <worldbody><body name=\"foot\"><geom type=\"mesh\" mesh=\"lost\"/><body name=\"letter\">\
+         <joint name=\"turn\" axis=\"0 1 0\"/>{geom}</body></body></worldbody></mujoco>"
+    )
+}
+
+/// Mass and first moments of the body, and an entry of its inertia, are those that MuJoCo 4.0.0 compiles: 1200 kg with the
+/// centre of mass at (-1.01215631, 0.02484649, 1.57833465) m.
+#[test]
+fn masses_of_meshes_are_those_of_mujoco() {
+    let corners = "0 0 0 2 0 0 2 1 0 1 1 0 1 3 0 0 3 0 0 0 .5 2 0 .5 2 1 .5 1 1 .5 1 3 .5 0 3 .5";
+    let triangles = "0 2 1 6 7 8 0 3 2 6 8 9 0 4 3 6 9 10 0 5 4 6 10 11 0 1 7 0 7 6 1 2 8 1 8 7 2 3 9 2 9 8 3 4 10 3 10 9 \
+                     4 5 11 4 11 10 5 0 6 5 6 11";
+    let more = "inertia=\"exact\" refpos=\"0.1 0.2 0.3\" refquat=\"0.8 0.2 0.5 0.1\"";
+    let geom = "<geom type=\"mesh\" mesh=\"m\" density=\"100\" pos=\".3 .2 .1\" euler=\"10 20 30\"/>";
+    let inline = format!("<mesh name=\"m\" vertex=\"{corners}\" face=\"{triangles}\" {more}/>");
+    // The mesh of the fixed body does not exist, and needs none.
+    let model = import(&letter(&inline, geom), &ImportOptions::default()).unwrap().model;
+    let value = |key: &str| -> f64 {
+        let at = model
+            .find(&format!("{key} = "))
+            .unwrap_or_else(|| panic!("no {key} in {model}"))
+            + key.len()
+            + 3;
+        let number: String = model[at..]
+            .chars()
+            .take_while(|c| "0123456789.-e".contains(*c))
+            .collect();
+        number.parse().unwrap()
+    };
+    assert!((value(" M") - 1200.0).abs() < 1e-6, "{model}");
+    for (key, centre) in [("MX", -1.012_156_31), ("MY", 0.024_846_49), ("MZ", 1.578_334_65)] {
+        assert!((value(key) / 1200.0 - centre).abs() < 1e-7, "{key}: {model}");
+    }
+    // The trace of the inertia does not depend on the axes; Steiner's part is 2 m |c|^2.
+    let trace = 4_893.939_464_96 + 4_093.670_427_66 + 929.411_383_98;
+    let steiner = 2.0 * 1200.0 * (1.012_156_31f64.powi(2) + 0.024_846_49f64.powi(2) + 1.578_334_65f64.powi(2));
+    let sum = value("XX") + value("YY") + value("ZZ");
+    assert!((sum / (trace + steiner) - 1.0).abs() < 1e-7, "{sum}: {model}");
+
+    // The same from a file, whose path is cut down to its name.
+    let triples = |text: &str, tag: &str, add: f64| -> String {
+        let all: Vec<f64> = text
+            .split_whitespace()
+            .map(|word| word.parse::<f64>().unwrap() + add)
+            .collect();
+        all.chunks(3)
+            .map(|c| format!("{tag} {} {} {}\n", c[0], c[1], c[2]))
+            .collect()
+    };
+    let obj = triples(corners, "v", 0.0) + &triples(triangles, "f", 1.0);
+    let read = |path: &str| match path {
+        "shapes/m.obj" => Ok(obj.clone().into_bytes()),
+        other => Err(format!("{other} is not there")),
+    };
+    let options = ImportOptions {
+        meshes: Some(MeshFiles(&read)),
+        ..ImportOptions::default()
+    };
+    let from_file = import(
+        &letter(&format!("<mesh file=\"far/away/m.obj\" {more}/>"), geom),
+        &options,
+    )
+    .unwrap();
+    assert_eq!(from_file.model, model);
+
+    // What is not computed is stated with its place.
+    let fault = |mesh: &str, geom: &str| import(&letter(mesh, geom), &options).unwrap_err().to_string();
+    assert!(fault("<mesh name=\"m\" file=\"n.obj\"/>", geom).contains("shapes/n.obj is not there"));
+    assert!(fault("<mesh file=\"m.obj\" inertia=\"convex\"/>", geom).contains("convex hull of a mesh"));
+    assert!(fault("<mesh name=\"m\" vertex=\"0 0 0\"/>", geom).contains("convex hull of points"));
+    assert!(fault("<mesh name=\"m\" builtin=\"sphere\"/>", geom).contains("built-in mesh"));
+    assert!(fault("<mesh file=\"m.obj\" inertia=\"thick\"/>", geom).contains("no inertia `thick`"));
+    assert!(fault("", geom).contains("no mesh `m`"));
+    let fitted = fault("<mesh file=\"m.obj\"/>", "<geom type=\"box\" mesh=\"m\"/>");
+    assert!(fitted.contains("a box that is fitted to a mesh"), "{fitted}");
+    let file = letter("<mesh file=\"m.obj\"/>", geom);
+    let without = import(&file, &ImportOptions::default()).unwrap_err().to_string();
+    assert!(without.contains("given as a file"), "{without}");
 }

@@ -1,0 +1,372 @@
+//! Triangle meshes: reads STL and OBJ, and integrates mass, centre and inertia over them.
+//!
+//! The integrals are sums over tetrahedra, one for each triangle, with the triangle as its base (B. Mirtich, "Fast and
+//! accurate computation of polyhedral mass properties", J. of Graphics Tools 1(2), 1996, gives the same integrals by
+//! faces). MuJoCo's three kinds differ in what is summed: see [`MeshInertia`].
+//!
+//! Decision: these are two readers of a few dozen lines and not the crates `stl_io` and `tobj`. Only corners and
+//! triangles are needed, and memory is reserved for what the bytes hold and not for what they state.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::description::DescriptionInertia;
+use super::placed::DescriptionPose;
+
+/// Length of the header of a binary STL, bytes.
+const STL_HEADER: usize = 80;
+/// Length of one triangle of a binary STL: normal, three corners and two bytes.
+const STL_TRIANGLE: usize = 50;
+/// A volume below this share of the cube of the mesh's size is that of a flat mesh. By judgement: far above rounding,
+/// far below a thin sheet.
+const FLAT: f64 = 1e-9;
+
+/// How the mass of a mesh is distributed: MuJoCo's attribute `inertia`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MeshInertia {
+    /// Tetrahedra with their volumes as positive numbers: exact for convex meshes, too much for others.
+    Legacy,
+    /// Tetrahedra with signs: exact for each closed mesh whose triangles face outwards.
+    Exact,
+    /// The mass lies on the surface.
+    Shell,
+}
+
+/// Triangles in space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct TriangleMesh {
+    /// Corners, m.
+    pub(super) corners: Vec<Vector3<f64>>,
+    /// Three corners of each triangle, counterclockwise as seen from outside.
+    pub(super) triangles: Vec<[usize; 3]>,
+}
+
+impl TriangleMesh {
+    /// Reads a mesh from the bytes of a file; the ending of its name determines the format.
+    ///
+    /// Fails with a phrase that states the fault.
+    pub(super) fn read(name: &str, bytes: &[u8]) -> Result<Self, String> {
+        let ending = name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+        match ending.as_str() {
+            "stl" => Self::read_stl(bytes),
+            "obj" => Self::read_obj(&String::from_utf8_lossy(bytes)),
+            _ => Err("only meshes in STL and OBJ files are read here".to_owned()),
+        }
+    }
+
+    /// Reads a binary STL, the only one that MuJoCo reads.
+    fn read_stl(bytes: &[u8]) -> Result<Self, String> {
+        let count = bytes.get(STL_HEADER..STL_HEADER + 4);
+        let count = count.and_then(|four| four.try_into().ok()).map(u32::from_le_bytes);
+        let body = bytes.get(STL_HEADER + 4..).unwrap_or_default();
+        let is_complete = count.is_some_and(|count| body.len() as u64 == u64::from(count) * STL_TRIANGLE as u64);
+        if !is_complete {
+            return Err("expected a binary STL whose length is that of its stated number of triangles".to_owned());
+        }
+        let number = |four: &[u8]| {
+            four.try_into()
+                .map_or(f64::NAN, |four| f64::from(f32::from_le_bytes(four)))
+        };
+        let mut mesh = Self::default();
+        for triangle in body.chunks_exact(STL_TRIANGLE) {
+            let first = mesh.corners.len();
+            // The normal stands before the corners; it follows from them.
+            for corner in triangle[12..48].chunks_exact(12) {
+                let numbers = [0, 4, 8].map(|at| number(&corner[at..at + 4]));
+                mesh.corners.push(Vector3::from(numbers));
+            }
+            mesh.triangles.push([first, first + 1, first + 2]);
+        }
+        mesh.checked()
+    }
+
+    /// Reads the corners and faces of an OBJ; a face of more than three corners is divided from its first one.
+    fn read_obj(text: &str) -> Result<Self, String> {
+        let mut mesh = Self::default();
+        for (i, line) in text.lines().enumerate() {
+            let mut words = line.split_whitespace();
+            let fault = |what: &str| format!("line {} of the mesh: {what}", i + 1);
+            match words.next() {
+                Some("v") => {
+                    let numbers: Vec<f64> = words.take(3).filter_map(|word| word.parse().ok()).collect();
+                    let [x, y, z] = numbers[..] else {
+                        return Err(fault("expected three numbers after `v`"));
+                    };
+                    mesh.corners.push(Vector3::new(x, y, z));
+                }
+                Some("f") => {
+                    let n = mesh.corners.len();
+                    // A corner is `place`, `place/texture` or `place/texture/normal`; negative places count from the end.
+                    let place = |word: &str| {
+                        let place: i64 = word.split('/').next()?.parse().ok()?;
+                        let from_start = if place < 0 {
+                            n.checked_sub(usize::try_from(place.unsigned_abs()).ok()?)
+                        } else {
+                            usize::try_from(place).ok()?.checked_sub(1)
+                        };
+                        from_start.filter(|at| *at < n)
+                    };
+                    let corners: Option<Vec<usize>> = words.map(place).collect();
+                    let Some(corners) = corners.filter(|corners| corners.len() >= 3) else {
+                        return Err(fault("expected at least three corners that exist after `f`"));
+                    };
+                    let others = corners[1..].windows(2);
+                    mesh.triangles.extend(others.map(|pair| [corners[0], pair[0], pair[1]]));
+                }
+                _ => {}
+            }
+        }
+        mesh.checked()
+    }
+
+    /// The mesh, if it has triangles and all its corners are finite and exist.
+    pub(super) fn checked(self) -> Result<Self, String> {
+        if self.triangles.is_empty() {
+            return Err("the mesh has no triangles".to_owned());
+        }
+        if self
+            .triangles
+            .iter()
+            .flatten()
+            .any(|corner| *corner >= self.corners.len())
+        {
+            return Err("a triangle of the mesh has a corner that does not exist".to_owned());
+        }
+        if !self.corners.iter().flat_map(Vector3::iter).all(|x| x.is_finite()) {
+            return Err("a corner of the mesh is not finite".to_owned());
+        }
+        Ok(self)
+    }
+
+    /// Moves the corners into other axes, then scales them: `scale (R^T (x - p))` per axis, as MuJoCo's `refpos`,
+    /// `refquat` and `scale` do. A mirrored mesh has its triangles turned round, so that they face outwards again.
+    pub(super) fn placed(mut self, reference: &DescriptionPose, scale: [f64; 3]) -> Self {
+        for corner in &mut self.corners {
+            let turned = reference.r.transpose() * (*corner - reference.p);
+            *corner = turned.component_mul(&Vector3::from(scale));
+        }
+        if scale.iter().product::<f64>() < 0.0 {
+            self.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        self
+    }
+
+    /// Mass, centre and inertia for a mass in kg, or else for a density in kg/m^3 (kg/m^2 for a shell).
+    ///
+    /// Fails with a phrase if the mesh has no volume, or is open where it must be closed.
+    pub(super) fn inertial(
+        &self,
+        kind: MeshInertia,
+        mass: Option<f64>,
+        density: f64,
+    ) -> Result<DescriptionInertia, String> {
+        if kind == MeshInertia::Exact && !self.is_closed() {
+            return Err("the mesh is not closed, as `inertia=\"exact\"` needs it".to_owned());
+        }
+        // Centre of the surface, from which the volume is divided into tetrahedra.
+        let faces = || self.triangles.iter().map(|triangle| triangle.map(|k| self.corners[k]));
+        let (mut area, mut middle) = (0.0, Vector3::zeros());
+        for [a, b, c] in faces() {
+            let of_face = 0.5 * (b - a).cross(&(c - a)).norm();
+            area += of_face;
+            middle += of_face * (a + b + c) / 3.0;
+        }
+        if area <= 0.0 {
+            return Err("the mesh has no surface".to_owned());
+        }
+        middle /= area;
+        let size = area.sqrt();
+        // Volume (or area) and centre.
+        let (mut volume, mut centre) = (0.0, Vector3::zeros());
+        for corners in faces() {
+            let share = kind.share(corners.map(|corner| corner - middle));
+            let [a, b, c] = corners;
+            let of_face = (a + b + c) / 3.0;
+            volume += share;
+            centre += share * kind.centre(&of_face, &middle);
+        }
+        if volume <= FLAT * size.powi(if kind == MeshInertia::Shell { 2 } else { 3 }) {
+            return Err("the mesh has no positive volume; its triangles must face outwards".to_owned());
+        }
+        centre /= volume;
+        // Second moments about the centre: for a tetrahedron with one corner there, and for a triangle.
+        let (mut second, mut total) = (Matrix3::zeros(), 0.0);
+        for corners in faces() {
+            let [a, b, c] = corners.map(|corner| corner - centre);
+            let share = kind.share([a, b, c]);
+            let sum = a + b + c;
+            let products = a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose();
+            second += share * products / if kind == MeshInertia::Shell { 12.0 } else { 20.0 };
+            total += share;
+        }
+        // The volume of tetrahedra from the centre of mass, which differs from that before for `Legacy`, is MuJoCo's.
+        let mass = mass.unwrap_or(density * total);
+        let inertia = Matrix3::identity() * second.trace() - second;
+        Ok(DescriptionInertia {
+            mass,
+            at: DescriptionPose {
+                p: centre,
+                r: Matrix3::identity(),
+            },
+            inertia: inertia * (mass / total),
+        })
+    }
+
+    /// Whether each edge of a triangle is that of another one in the opposite direction. Corners at one place count as
+    /// one, since an STL has three for each triangle.
+    fn is_closed(&self) -> bool {
+        let mut places: BTreeMap<[u64; 3], usize> = BTreeMap::new();
+        let place: Vec<usize> = (self.corners.iter())
+            .map(|corner| {
+                // Zeros of both signs are one place.
+                let key = [corner.x, corner.y, corner.z].map(|x| (x + 0.0).to_bits());
+                let next = places.len();
+                *places.entry(key).or_insert(next)
+            })
+            .collect();
+        let mut edges: BTreeMap<(usize, usize), i64> = BTreeMap::new();
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|corner| place[corner]);
+            for (from, to) in [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from != to) {
+                *edges.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
+            }
+        }
+        edges.values().all(|balance| *balance == 0)
+    }
+}
+
+impl MeshInertia {
+    /// Volume of the tetrahedron between the origin and a triangle, m^3, or the area of the triangle, m^2.
+    fn share(self, [a, b, c]: [Vector3<f64>; 3]) -> f64 {
+        match self {
+            Self::Legacy => (a.cross(&b).dot(&c) / 6.0).abs(),
+            Self::Exact => a.cross(&b).dot(&c) / 6.0,
+            Self::Shell => 0.5 * (b - a).cross(&(c - a)).norm(),
+        }
+    }
+
+    /// The centre of a tetrahedron between a triangle with centre `of_face` and the corner `apex`, or of the triangle.
+    fn centre(self, of_face: &Vector3<f64>, apex: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Legacy | Self::Exact => 0.75 * of_face + 0.25 * apex,
+            Self::Shell => *of_face,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A closed body with the outline of an L, 2 m by 3 m with arms of 1 m, and 0.5 m thick.
+    fn letter() -> TriangleMesh {
+        let outline = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)];
+        let n = outline.len();
+        let level = |z: f64| outline.map(|(x, y)| Vector3::new(x, y, z));
+        let mut triangles = Vec::new();
+        for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]] {
+            triangles.extend([[a, c, b], [a + n, b + n, c + n]]);
+        }
+        for i in 0..n {
+            let j = (i + 1) % n;
+            triangles.extend([[i, j, j + n], [i, j + n, i + n]]);
+        }
+        TriangleMesh {
+            corners: level(0.0).into_iter().chain(level(0.5)).collect(),
+            triangles,
+        }
+    }
+
+    fn assert_near(found: &DescriptionInertia, mass: f64, centre: [f64; 3], moments: [f64; 3]) {
+        let mut own: Vec<f64> = found.inertia.symmetric_eigenvalues().iter().copied().collect();
+        own.sort_by(|a, b| b.total_cmp(a));
+        let off = |a: f64, b: f64| (a - b).abs() / b.abs();
+        assert!(off(found.mass, mass) < 1e-12, "{}", found.mass);
+        assert!((found.at.p - Vector3::from(centre)).norm() < 1e-8, "{}", found.at.p);
+        assert!(own.iter().zip(moments).all(|(a, b)| off(*a, b) < 1e-8), "{own:?}");
+    }
+
+    /// The numbers are those of MuJoCo 4.0.0 for the same corners and triangles with 100 kg/m^3.
+    #[test]
+    fn masses_of_a_letter_are_those_of_mujoco() {
+        let of = |kind| letter().inertial(kind, None, 100.0).unwrap();
+        let exact = [208.333_333_333, 170.833_333_333, 45.833_333_333];
+        assert_near(&of(MeshInertia::Exact), 200.0, [0.75, 1.25, 0.25], exact);
+        let shell = [1_636.538_461_54, 1_323.567_044_35, 433.804_750_52];
+        assert_near(&of(MeshInertia::Shell), 1300.0, [10.0 / 13.0, 16.5 / 13.0, 0.25], shell);
+        let legacy = [211.702_060_62, 172.060_940_49, 48.176_248_73];
+        let place = [0.774_362_91, 1.242_154_32, 0.25];
+        assert_near(&of(MeshInertia::Legacy), 208.071_810_602_485_44, place, legacy);
+    }
+
+    /// The same body from an OBJ with quadrangles and from an STL, mirrored and moved.
+    #[test]
+    fn both_formats_give_one_body() {
+        let body = letter();
+        let mut obj: String = body
+            .corners
+            .iter()
+            .fold(String::new(), |text, v| text + &format!("v {} {} {}\n", v.x, v.y, v.z));
+        for [a, b, c] in &body.triangles {
+            obj += &format!("f {}/1/1 {}//2 {}\n", a + 1, b + 1, *c as i64 - 12);
+        }
+        let mut stl = vec![0; STL_HEADER];
+        stl.extend(u32::try_from(body.triangles.len()).unwrap().to_le_bytes());
+        for triangle in &body.triangles {
+            stl.extend([0; 12]);
+            for corner in triangle {
+                #[expect(clippy::cast_possible_truncation, reason = "halves are exact")]
+                stl.extend(body.corners[*corner].iter().flat_map(|x| (*x as f32).to_le_bytes()));
+            }
+            stl.extend([0; 2]);
+        }
+        let want = body.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap();
+        for mesh in [
+            TriangleMesh::read("l.OBJ", obj.as_bytes()),
+            TriangleMesh::read("l.stl", &stl),
+        ] {
+            let mesh = mesh.unwrap();
+            assert_eq!(
+                mesh.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap().inertia,
+                want.inertia
+            );
+            // A mirrored mesh still faces outwards.
+            let mirrored = mesh.placed(&DescriptionPose::identity(), [-1.0, 1.0, 1.0]);
+            let found = mirrored.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap();
+            assert!((found.at.p.x + want.at.p.x).abs() < 1e-12 && found.mass == 3.0);
+        }
+    }
+
+    #[test]
+    fn faults_of_meshes_are_stated() {
+        let fault = |name: &str, bytes: &[u8]| TriangleMesh::read(name, bytes).unwrap_err();
+        assert!(fault("a.stl", b"solid a").contains("binary STL"));
+        let mut long = vec![0; STL_HEADER];
+        long.extend(u32::MAX.to_le_bytes());
+        assert!(fault("a.stl", &long).contains("stated number of triangles"));
+        assert!(fault("a.msh", b"").contains("STL and OBJ"));
+        assert!(fault("a.obj", b"v 0 0\n").contains("line 1"));
+        assert!(fault("a.obj", b"v 0 0 0\nf 1 1 2\n").contains("line 2"));
+        assert!(fault("a.obj", b"v 0 0 nan\nf 1 1 1\n").contains("not finite"));
+        assert!(fault("a.obj", b"v 0 0 0\n").contains("no triangles"));
+        let mut open = letter();
+        open.triangles.pop();
+        let inertial = |mesh: &TriangleMesh, kind| mesh.inertial(kind, None, 1.0).map(|one| one.mass);
+        assert!(inertial(&open, MeshInertia::Exact).unwrap_err().contains("not closed"));
+        let mut inside_out = letter();
+        inside_out.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        assert!(
+            inertial(&inside_out, MeshInertia::Exact)
+                .unwrap_err()
+                .contains("face outwards")
+        );
+        let mut flat = letter();
+        flat.corners.iter_mut().for_each(|corner| corner.z = 0.0);
+        assert!(
+            inertial(&flat, MeshInertia::Legacy)
+                .unwrap_err()
+                .contains("no positive volume")
+        );
+    }
+}
