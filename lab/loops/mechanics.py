@@ -3,13 +3,14 @@
 Positions and their first two derivatives with respect to time are computed together (`Jet`); passive coordinates follow by Newton's
 method from all closures; forces are those of d'Alembert's principle with the ten linear parameters of each body. Read are frames
 (`transform`, `modified_dh`, joints), coordinates (`passive`, `follows`), points, loops (`joins`, `welds`), parts, lumped masses, and
-drives of joints and between two points.
+drives of joints and between two points. Numbers are doubles or have sixty digits (`precision`).
 """
 
-import math
 import tomllib
 
 import numpy as np
+
+from precision import DOUBLE, as_doubles, as_numbers, elementwise
 
 
 class Jet:
@@ -21,9 +22,9 @@ class Jet:
     __array_priority__ = 1000
 
     def __init__(self, a, b=None, c=None):
-        self.a = np.asarray(a, dtype=float)
-        self.b = np.zeros_like(self.a) if b is None else np.asarray(b, dtype=float)
-        self.c = np.zeros_like(self.a) if c is None else np.asarray(c, dtype=float)
+        self.a = as_numbers(a)
+        self.b = np.zeros(self.a.shape) if b is None else as_numbers(b)
+        self.c = np.zeros(self.a.shape) if c is None else as_numbers(c)
 
     @staticmethod
     def of(x):
@@ -90,19 +91,16 @@ class Jet:
 
 
 def elementary(f, d, dd):
-    def apply(x):
-        if isinstance(x, Jet):
-            return x.apply(f(x.a), d(x.a), dd(x.a))
-        return float(f(x))
-    return apply
+    return lambda x: x.apply(f(x.a), d(x.a), dd(x.a)) if isinstance(x, Jet) else f(x)
 
 
-sin = elementary(np.sin, np.cos, lambda x: -np.sin(x))
-cos = elementary(np.cos, lambda x: -np.sin(x), lambda x: -np.cos(x))
-sqrt = elementary(np.sqrt, lambda x: 0.5 / np.sqrt(x), lambda x: -0.25 * x**-1.5)
-exp = elementary(np.exp, np.exp, np.exp)
-tanh = elementary(np.tanh, lambda x: 1 - np.tanh(x) ** 2, lambda x: -2 * np.tanh(x) * (1 - np.tanh(x) ** 2))
-FUNCTIONS = {"sin": sin, "cos": cos, "sqrt": sqrt, "exp": exp, "tanh": tanh, "pi": math.pi, "__builtins__": {}}
+SIN, COS, SQRT, EXP, TANH = map(elementwise, ("sin", "cos", "sqrt", "exp", "tanh"))
+sin = elementary(SIN, COS, lambda x: -SIN(x))
+cos = elementary(COS, lambda x: -SIN(x), lambda x: -COS(x))
+sqrt = elementary(SQRT, lambda x: 0.5 / SQRT(x), lambda x: -0.25 / (x * SQRT(x)))
+exp = elementary(EXP, EXP, EXP)
+tanh = elementary(TANH, lambda x: 1 - TANH(x) ** 2, lambda x: -2 * TANH(x) * (1 - TANH(x) ** 2))
+FUNCTIONS = {"sin": sin, "cos": cos, "sqrt": sqrt, "exp": exp, "tanh": tanh, "__builtins__": {}}
 
 
 def turn(axis, angle):
@@ -111,7 +109,7 @@ def turn(axis, angle):
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     matrices = []
     for order, (cc, ss) in enumerate(((c.a, s.a), (c.b, s.b), (c.c, s.c))):
-        m = np.zeros(np.shape(cc) + (3, 3))
+        m = np.zeros(np.shape(cc) + (3, 3), dtype=cc.dtype)
         m[..., i, i] = m[..., j, j] = cc
         m[..., j, i], m[..., i, j] = ss, -ss
         if order == 0:
@@ -137,7 +135,7 @@ class Polynomial:
 
     @staticmethod
     def of(x):
-        return x if isinstance(x, Polynomial) else Polynomial({(): float(x)})
+        return x if isinstance(x, Polynomial) else Polynomial({(): x})
 
     def __add__(self, o):
         out = dict(self.terms)
@@ -174,7 +172,7 @@ class Polynomial:
 
     def __pow__(self, n):
         out = Polynomial({(): 1.0})
-        for _ in range(n):
+        for _ in range(int(n)):
             out = out * self
         return out
 
@@ -184,12 +182,15 @@ def vee(m):
 
 
 class Mechanism:
-    def __init__(self, text):
-        self.file = tomllib.loads(text)
+    """A model file. `relations` are expressions that define constants and replace their decimals in the file."""
+
+    def __init__(self, text, precision=DOUBLE, relations={}):
+        self.precision = precision
+        self.file = tomllib.loads(text, parse_float=precision.read)
         f = self.file
-        self.constants = dict(FUNCTIONS)
+        self.constants = {**FUNCTIONS, "pi": precision.pi, "number": precision.read}
         for name, entry in f.get("constants", {}).items():
-            self.constants[name] = self.plain(entry["value"] if isinstance(entry, dict) else entry)
+            self.constants[name] = self.plain(relations.get(name, entry["value"] if isinstance(entry, dict) else entry))
         coordinates = f["coordinates"]
         self.follows = {n: e["follows"] for n, e in coordinates.items() if "follows" in e}
         self.passive = [n for n, e in coordinates.items() if e.get("passive")]
@@ -202,12 +203,12 @@ class Mechanism:
         self.at_nominal = np.array([self.nominal[n] for n in self.passive])
 
     def plain(self, x):
-        return float(eval(x.replace("^", "**"), dict(self.constants))) if isinstance(x, str) else float(x)
+        return self.precision.read(eval(self.precision.expression(x), dict(self.constants)) if isinstance(x, str) else x)
 
     def value(self, x, values):
         if isinstance(x, str):
-            return Jet.of(eval(x.replace("^", "**"), {**self.constants, **values}))
-        return Jet(x)
+            return Jet.of(eval(self.precision.expression(x), {**self.constants, **values}))
+        return Jet(self.precision.read(x))
 
     def poses(self, values):
         """Rotation and position of all frames, from jets of the coordinates."""
@@ -302,16 +303,18 @@ class Mechanism:
         spread = lambda x: np.broadcast_to(x, shape + x.shape[-1:])  # noqa: E731
         return Jet(*(np.concatenate([spread(getattr(r, x)) for r in rows], axis=-1) if rows else np.zeros(0) for x in "abc"))
 
-    def values(self, q, qd, qdd, passive=None):
-        out = {n: Jet(*np.broadcast_arrays(*x)) for n, x in zip(self.active, zip(q, np.asarray(qd).T, np.asarray(qdd).T))}
-        for k, n in enumerate(self.passive):
-            out[n] = Jet(*np.broadcast_arrays(*(np.asarray(row).T[k] for row in passive)))
+    def values(self, *motions):
+        """Jets of all coordinates, from values, rates and accelerations of the independent ones and of the passive ones."""
+        out = {}
+        for names, motion in zip((self.active, self.passive), (motions[:3], motions[3])):
+            rows = [self.precision.array(x).T for x in motion]
+            out.update((n, Jet(*np.broadcast_arrays(*(row[k] for row in rows)))) for k, n in enumerate(names))
         return out
 
     def solve(self, q, qd, qdd, start=None):
         """Passive coordinates with their rates and accelerations, and the Jacobian of their rates; None if loops stay open."""
         n, m = len(self.active), len(self.passive)
-        x = np.array(self.at_nominal if start is None else start)
+        x = self.precision.array(self.at_nominal if start is None else start)
         zero, zeros = np.zeros(m), np.zeros(n)
         if not self.file.get("loop"):
             return np.zeros((3, 0)), np.zeros((0, n))
@@ -321,21 +324,33 @@ class Mechanism:
 
         def jacobian():
             return residual(zeros, zeros, np.eye(m), np.zeros((m, m))).b.T.reshape(-1, m)
+        largest = np.inf
         for k in range(30):
             r = residual(zeros, zeros, zero, zero).a
-            step = np.linalg.lstsq(jacobian(), -r, rcond=1e-9)[0]
-            x = x + step * min(1.0, 0.5 / max(np.abs(step).max(), 1e-30))
-            if np.abs(step).max() < 3e-14 or k > 12 and np.abs(r).max() > 0.1:
+            if largest > 1e-6:
+                # Small steps do not change the Jacobian.
+                phi = as_doubles(jacobian())
+            step = np.linalg.lstsq(phi, as_doubles(-r), rcond=1e-9)[0]
+            largest = np.abs(step).max()
+            x = x + step * min(1.0, 0.5 / max(largest, 1e-30))
+            if largest < self.precision.step or k > 12 and np.abs(r).max() > 0.1:
                 break
-        if np.abs(residual(zeros, zeros, zero, zero).a).max() > 1e-12:
+        if np.abs(residual(zeros, zeros, zero, zero).a).max() > self.precision.residual:
             return None
         phi = jacobian()
-        self.conditions = np.linalg.svd(phi, compute_uv=False)
-        inverse = np.linalg.pinv(phi, rcond=1e-9)
-        ofs = -inverse @ residual(np.eye(n), np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, m))).b.reshape(n, -1).T
+        self.conditions = np.linalg.svd(as_doubles(phi), compute_uv=False)
+        ofs = self.least_squares(phi, -residual(np.eye(n), np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, m))).b.reshape(n, -1).T)
         xd = ofs @ qd
-        xdd = -inverse @ residual(qd, qdd, xd, zero).c
+        xdd = self.least_squares(phi, -residual(qd, qdd, xd, zero).c)
         return np.array([x, xd, xdd]), ofs
+
+    def least_squares(self, phi, right):
+        """Solution of redundant equations: by the pseudo-inverse in double precision, corrected in the numbers of the file."""
+        inverse = np.linalg.pinv(as_doubles(phi), rcond=1e-9)
+        x = inverse @ right
+        for _ in range(self.precision.n_corrections):
+            x = x + inverse @ (right - phi @ x)
+        return x
 
     def follow(self, q, n_steps=4):
         """Passive coordinates at `q`, followed from the nominal pose; none if the way is not passable."""
@@ -353,12 +368,12 @@ class Mechanism:
         if hasattr(self, "known_bodies"):
             return self.known_bodies
         symbols = {n: Polynomial({((n, 1),): 1.0}) for n in self.file.get("parameters", {})}
-        self.nominal_parameters = {n: float(e.get("nominal", 0.0)) for n, e in self.file.get("parameters", {}).items()}
+        self.nominal_parameters = {n: self.precision.read(e.get("nominal", 0.0)) for n, e in self.file.get("parameters", {}).items()}
 
         def read(x):
             if isinstance(x, str):
-                x = eval(x.replace("^", "**"), {**self.constants, **symbols})
-            return x if isinstance(x, Polynomial) else Polynomial({(): float(x)})
+                x = eval(self.precision.expression(x), {**self.constants, **symbols})
+            return x if isinstance(x, Polynomial) else Polynomial({(): self.precision.read(x)})
         zero = Polynomial({})
         out = []
         for part in self.file.get("part", []):
@@ -369,7 +384,7 @@ class Mechanism:
                 keys = KEYS if "all" in part["linear"] else ("ZZ", "MX", "MY", "M") if "planar" in part["linear"] else ()
                 ten = [zero] * 10
                 for key in keys:
-                    self.nominal_parameters[key + suffix] = float(nominal.get(key, 0.0))
+                    self.nominal_parameters[key + suffix] = self.precision.read(nominal.get(key, 0.0))
                     ten[KEYS.index(key)] = Polynomial({((key + suffix, 1),): 1.0})
                 for key, x in linear.items():
                     ten[KEYS.index(key)] = read(x)
@@ -400,7 +415,7 @@ class Mechanism:
         for b, (_, ten) in enumerate(bodies):
             for k, polynomial in enumerate(ten):
                 for monomial, factor in polynomial.terms.items():
-                    found.setdefault(monomial, np.zeros(10 * len(bodies)))[10 * b + k] += factor
+                    found.setdefault(monomial, self.precision.array(np.zeros(10 * len(bodies))))[10 * b + k] += factor
         return found
 
     def parameter_values(self):
@@ -426,17 +441,16 @@ class Mechanism:
             w = vee(r.a.T @ r.b)
             alpha = vee(r.a.T @ r.c)
             a = r.a.T @ (p.c - self.gravity)
-            force, moment = np.zeros((3, 10)), np.zeros((3, 10))
-            for k in range(10):
-                unit = np.eye(10)[k]
+            force, moment = [], []
+            for unit in np.eye(10):
                 i = np.array([[unit[0], unit[1], unit[2]], [unit[1], unit[3], unit[4]], [unit[2], unit[4], unit[5]]])
                 c, m = unit[6:9], unit[9]
-                force[:, k] = m * a + np.cross(alpha, c) + np.cross(w, np.cross(w, c))
-                moment[:, k] = np.cross(c, a) + i @ alpha + np.cross(w, i @ w)
+                force.append(m * a + np.cross(alpha, c) + np.cross(w, np.cross(w, c)))
+                moment.append(np.cross(c, a) + i @ alpha + np.cross(w, i @ w))
             r1, p1 = units[frame]
             velocity = np.broadcast_to(p1.b, (n, 3)) @ r.a
             rotation = np.broadcast_to(vee(r.a.T @ r1.b), (n, 3))
-            blocks.append(velocity @ force + rotation @ moment)
+            blocks.append(velocity @ np.array(force).T + rotation @ np.array(moment).T)
         # From ten columns of each body to one column of each product of parameters.
         return np.concatenate(blocks, axis=1) @ np.array(list(self.columns().values())).T
 
@@ -461,29 +475,3 @@ class Mechanism:
                     row.append(float(d.a @ d.b / np.linalg.norm(d.a)))
             out.append(row)
         return np.array(out)
-
-
-def rank_of(mechanism, rng, spread=0.25, n_states=None, expected=None):
-    """Rank of the regressor over random states, the singular values on both sides of it, and the number of states."""
-    n = len(mechanism.active)
-    rows, tries = [], 0
-    wanted = n_states or max(24, 12 * len(mechanism.bodies()))
-    nominal = np.array([mechanism.nominal[x] for x in mechanism.active])
-    while len(rows) * n < wanted and tries < 10 * wanted:
-        tries += 1
-        q = nominal + rng.uniform(-spread, spread, n) * np.maximum(np.abs(nominal), 0.3)
-        start = mechanism.follow(q)
-        h = None if start is None else mechanism.regressor(q, rng.uniform(-2, 2, n), rng.uniform(-4, 4, n), start)
-        if h is not None:
-            rows.append(h)
-    matrix = np.concatenate(rows)
-    # Columns of similar size; those that are only rounding stay small.
-    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-2 * np.linalg.norm(matrix, axis=0).max())
-    s = np.linalg.svd(matrix, compute_uv=False)
-    s = np.r_[s / s[0], 1e-17]
-    # States are closed to 1e-13. A clear step at the expected rank decides, else what is above rounding.
-    if expected and expected < len(s) and s[expected] < 1e-13 and s[expected - 1] > 20 * s[expected]:
-        rank = expected
-    else:
-        rank = int((s > 1e-12).sum())
-    return rank, s[rank - 1], s[rank], len(rows)

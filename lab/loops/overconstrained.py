@@ -18,10 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics import Mechanism, rank_of
+from mechanics import Mechanism
+from rank import DROPPED, KEPT, random_positions, rank_of, states_near_nominal
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "random-descriptions"))
 from imported import EmittedModel  # noqa: E402
+
+
+# Of independent coordinates, relative to their nominal values.
+SPREAD = 0.5
 
 
 class ModelFile:
@@ -30,6 +35,8 @@ class ModelFile:
     def __init__(self, name, rng):
         self.name, self.rng = name, rng
         self.constants, self.coordinates, self.rest = {"g": (9.81, "m/s^2")}, {}, []
+        # Expressions of constants that must satisfy a relation exactly.
+        self.relations = {}
 
     def constant(self, name, value, unit="m"):
         self.constants[name] = (float(value), unit)
@@ -37,6 +44,12 @@ class ModelFile:
 
     def length(self, name, low=0.2, high=0.6):
         return self.constant(name, round(self.rng.uniform(low, high), 3))
+
+    def relation(self, name, expression):
+        """A length that other constants determine: the file has its 17 digits, the independent mechanics all digits."""
+        self.relations[name] = expression
+        values = {n: value for n, (value, _) in self.constants.items()}
+        return self.constant(name, eval(expression, {"sin": math.sin, "sqrt": math.sqrt}, values))
 
     def coordinate(self, name, nominal=0.0, passive=True):
         self.coordinates[name] = [nominal, passive]
@@ -166,7 +179,7 @@ def bennett_links(f, a="a", b="b", alpha="alpha", beta="beta"):
     rng = f.rng
     f.constant(alpha, round(rng.uniform(0.5, 1.0), 3), "rad"), f.constant(beta, round(rng.uniform(1.1, 1.5), 3), "rad")
     f.length(a, 0.3, 0.5)
-    f.constant(b, f.constants[a][0] * math.sin(f.constants[beta][0]) / math.sin(f.constants[alpha][0]))
+    f.relation(b, f"{a} * sin({beta}) / sin({alpha})")
 
 
 def bennett(f, slide):
@@ -184,7 +197,7 @@ def goldberg(f, slide):
     f.constant("alpha", round(rng.uniform(0.5, 0.8), 3), "rad"), f.constant("beta", round(rng.uniform(0.9, 1.2), 3), "rad"), f.constant("gamma", round(rng.uniform(0.6, 0.85), 3), "rad")
     f.length("a", 0.3, 0.5)
     for n, angle in (("b", "beta"), ("c", "gamma")):
-        f.constant(n, f.constants["a"][0] * math.sin(f.constants[angle][0]) / math.sin(f.constants["alpha"][0]))
+        f.relation(n, f"a * sin({angle}) / sin(alpha)")
     chain(f, [("b + c", "beta + gamma", 0), ("a", "alpha", 0), ("c", "gamma", 0), ("b", "beta", 0), ("a", "alpha", 0)])
     f.coordinates["q1"][0] = 0.8
     if slide:
@@ -198,12 +211,11 @@ def bricard(f, slide):
     if rng.random() < 0.5:
         # Trihedral.
         v = [round(rng.uniform(0.25, 0.4), 3) for _ in range(5)]
-        last = math.sqrt(v[0] ** 2 + v[2] ** 2 + v[4] ** 2 - v[1] ** 2 - v[3] ** 2) if v[0] ** 2 + v[2] ** 2 + v[4] ** 2 > v[1] ** 2 + v[3] ** 2 else None
-        if last is None or last < 0.1:
+        if v[0] ** 2 + v[2] ** 2 + v[4] ** 2 < v[1] ** 2 + v[3] ** 2 + 0.01:
             v = [0.4, 0.3, 0.38, 0.35, 0.33]
-            last = math.sqrt(v[0] ** 2 + v[2] ** 2 + v[4] ** 2 - v[1] ** 2 - v[3] ** 2)
-        for k, x in enumerate(v + [last]):
+        for k, x in enumerate(v):
             f.constant(f"a{k + 1}", x)
+        f.relation("a6", "sqrt(a1**2 + a3**2 + a5**2 - a2**2 - a4**2)")
         links = [(f"a{k + 1}", "pi/2" if k % 2 == 0 else "-pi/2", 0) for k in range(6)]
     else:
         # Line-symmetric.
@@ -238,6 +250,41 @@ def tripteron(f, slide):
         del f.coordinates[f"w{k}"]
         f.frame(f"ps{k}", "pl", rpy=side)
         f.hinge_by_points(f"h{k}", [(f"up{k}", ["l2", 0, 0]), (f"ps{k}", ["h", 0, 0])], axis="z")
+
+
+def exechon(f, slide):
+    """Two legs of universal, prismatic and revolute joints in one plane, and one of spherical, prismatic and revolute joints."""
+    rng = f.rng
+    f.length("B", 0.3, 0.4), f.length("b", 0.1, 0.16), f.length("C", 0.35, 0.45), f.length("c", 0.12, 0.2)
+    # A symmetric pose, from which Newton's method starts.
+    lean = math.asin((f.constants["B"][0] - f.constants["b"][0]) / 0.9)
+    for n, nominal in {"a1": 0.0, "b1": lean, "c1": -lean, "a3": 0.0, "b3": -lean, "c3": lean, "sa": 0.0, "sb": -0.25, "sc": 0.0}.items():
+        f.coordinate(n, nominal, slide or n not in ("a1", "b1", "b3"))
+    for k in (1, 2, 3):
+        f.coordinate(f"l{k}", 0.9, not slide)
+    for k, side in ((1, ""), (3, "-")):
+        f.frame(f"u{k}", "base", xyz=[0, f"{side}B", 0], joint=f'universal = ["a{k}", "b{k}"], axes = "yx"')
+        f.frame(f"p{k}", f"u{k}", joint=f'prismatic = "l{k}"')
+    f.frame("pl", "p1", joint='revolute = "c1", axis = "x"')
+    f.frame("s2", "base", xyz=["C", 0, 0], joint='spherical = ["sa", "sb", "sc"], axes = "xyz"')
+    f.frame("p2", "s2", joint='prismatic = "l2"')
+    for frame in ("u1", "p1", "pl", "u3", "p3", "s2", "p2"):
+        f.part(frame)
+    closure = rng.choice(["weld", "points", "point"])
+    if closure == "weld":
+        f.frame("end", "p3", joint='revolute = "c3", axis = "x"')
+        f.frame("at", "pl", xyz=[0, "-2*b", 0])
+        f.welds("plane", "end", "at")
+    else:
+        del f.coordinates["c3"]
+        if closure == "points":
+            f.hinge_by_points("plane", [("p3", [0, 0, 0]), ("pl", [0, "-2*b", 0])], axis="x")
+        else:
+            f.joins("plane", f.point("plane0", "p3", [0, 0, 0]), f.point("plane1", "pl", [0, "-2*b", 0]))
+    f.frame("arm", "pl", xyz=["c", "-b", 0])
+    f.hinge_by_points("side", [("p2", [0, 0, 0]), ("arm", [0, 0, 0])])
+    for n in ("l1", "l2", "l3") if slide else ("a1", "b1", "b3"):
+        f.drive(n)
 
 
 def planar_ring(f, lengths, slide, closure, moved="q1"):
@@ -299,7 +346,7 @@ def three_cranks(f, slide):
         f.drive("q1")
 
 
-FAMILIES = {f.__name__: f for f in (sarrus, bennett, goldberg, bricard, tripteron, kite, welded_four_bar, three_cranks)}
+FAMILIES = {f.__name__: f for f in (sarrus, bennett, goldberg, bricard, tripteron, exechon, kite, welded_four_bar, three_cranks)}
 
 
 def closed(f, rng):
@@ -334,45 +381,80 @@ def check(program, path):
     return json.loads(done.stdout), done.stderr
 
 
-def judge(program, path, rng, spread=0.5):
-    """What differs between modelmill and the independent mechanics; empty if nothing does."""
+def judge(program, path, rng, relations={}):
+    """The verdict on modelmill's answer (right, wrong, refused), and the numbers that it rests on."""
     start = time.time()
     answer, said = check(program, path)
     took = time.time() - start
     if answer is None or not answer.get("valid"):
-        return f"refused: {said.strip() or answer}", took
-    m = Mechanism(path.read_text())
-    rank, last, beyond, n_states = rank_of(m, rng, spread, answer["base_parameters"] + 12, answer["base_parameters"])
-    faults = []
-    # Without a step to below rounding, double precision cannot decide the rank.
-    is_undecided = answer["base_parameters"] != rank and last < 1e-10
-    if answer["base_parameters"] != rank:
-        faults.append(("undecided: " if is_undecided else "") + f"{answer['base_parameters']} base parameters, rank {rank} (singular values {last:.1e}, {beyond:.1e}, {n_states} states, {answer['reduction']})")
-    model = EmittedModel(program, path)
-    worst, done = 0.0, 0
-    nominal = np.array([m.nominal[n] for n in m.active])
-    values = m.parameter_values()
-    for _ in range(10):
-        q = nominal + rng.uniform(-spread, spread, len(nominal)) * np.maximum(np.abs(nominal), 0.3)
-        qd, qdd = rng.uniform(-1, 1, len(nominal)), rng.uniform(-1, 1, len(nominal))
-        start = m.follow(q)
-        if start is None:
-            continue
-        h = m.regressor(q, qd, qdd, start)
+        return "refused", f"{took:.1f} s: {said.strip() or answer}"
+    n_base = answer["base_parameters"]
+    text = f"{n_base} base parameters ({answer['reduction']['name']}, {took:.1f} s)"
+    try:
+        start = time.time()
+        rank, last, beyond, n_states = rank_of(path.read_text(), relations, rng, SPREAD, n_base + 12)
+        text += f", rank {rank} (pivots {last:.1e} and {beyond:.1e}, {n_states} states, {time.time() - start:.1f} s)"
+        m, model = Mechanism(path.read_text()), EmittedModel(program, path)
+        worst, count = force_difference(m, model, rng)
+        gap, n_closed = largest_gap(m, model, rng)
+        text += f", forces to {worst:.1e} ({count['compared']} states), loops to {gap:.1e} ({n_closed} states)"
+    except Exception as fault:  # noqa: BLE001
+        return "wrong", f"{text}, fault: {fault!r}"
+    faults = {
+        f"the rank has no step from above {KEPT} to below {DROPPED}": last < KEPT,
+        "the number of base parameters is not the rank": n_base != rank,
+        "forces differ": worst > 1e-9,
+        "emitted code leaves loops open": gap > 1e-9,
+        f"emitted code refuses {count['refused']} states": count["refused"],
+        f"emitted code takes another assembly at {count['other assembly']} states": count["other assembly"],
+        "no state is compared": not count["compared"],
+    }
+    wrong = [name for name, is_so in faults.items() if is_so]
+    return ("wrong" if wrong else "right"), f"{text}{': ' * bool(wrong)}{', '.join(wrong)}"
+
+
+def emitted_passive(m, model, q):
+    """Passive coordinates of emitted C99, in the order of the file."""
+    passive = dict(zip(model.passive, model.passive_motion(q, 0 * q, 0 * q)[0]))
+    return np.array([passive[n] for n in m.passive])
+
+
+def force_difference(m, model, rng):
+    """The largest difference of the forces of emitted C99, relative to the largest force, and a count of states."""
+    values, worst, count = m.parameter_values(), 0.0, collections.Counter()
+    for q, start in states_near_nominal(m, rng, SPREAD, 8):
+        qd, qdd = rng.uniform(-1, 1, len(q)), rng.uniform(-1, 1, len(q))
+        expected = m.regressor(q, qd, qdd, start) @ values
         try:
-            forces = model.forces(q, qd, qdd)
+            forces = m.drive_rows(q, qd, start).T @ model.forces(q, qd, qdd)
+            passive = emitted_passive(m, model, q)
         except ArithmeticError:
-            faults.append(f"{model.name}: emitted code refuses q = {q}")
+            count["refused"] += 1
             continue
-        expected = h @ values
-        got = m.drive_rows(q, qd, start).T @ forces
-        worst = max(worst, np.abs(got - expected).max() / max(1.0, np.abs(expected).max()))
-        done += 1
-    if worst > 1e-9:
-        faults.append(f"forces differ by {worst:.1e}")
-    if not done:
-        faults.append("no state compared")
-    return "; ".join(faults), took
+        # Other passive coordinates that close the loops as well.
+        is_other = np.abs(passive - start).max(initial=0.0) > 1e-6 and gaps(m, [q], [passive]).max() < 1e-9
+        count["other assembly" if is_other else "compared"] += 1
+        if not is_other:
+            worst = max(worst, np.abs(forces - expected).max() / max(1.0, np.abs(expected).max()))
+    return worst, count
+
+
+def gaps(m, q, passive):
+    """The largest gap of all loops, for each pose."""
+    q, passive = np.array(q), np.array(passive)
+    poses = m.poses(m.values(q, 0 * q, 0 * q, (passive, 0 * passive, 0 * passive)))
+    return np.abs(m.closure(poses).a).max(axis=-1, initial=0.0)
+
+
+def largest_gap(m, model, rng, n_states=1000):
+    """The largest gap of all loops at passive coordinates of emitted C99, and the number of states that it does not refuse."""
+    closed = []
+    for q in random_positions(m, rng, SPREAD, n_states):
+        try:
+            closed.append((q, emitted_passive(m, model, q)))
+        except ArithmeticError:
+            pass
+    return (gaps(m, *zip(*closed)).max() if closed else 0.0), len(closed)
 
 
 def main():
@@ -406,13 +488,9 @@ def main():
                 continue
             path = folder / f"{name}-{seed}.toml"
             path.write_text(text)
-            try:
-                why, took = judge(chosen.program, path, rng)
-            except Exception as fault:  # noqa: BLE001
-                why, took = f"fault: {fault!r}", 0.0
-            verdict = "right" if not why else "refused" if why.startswith("refused") else "undecided" if why.startswith("undecided") and ";" not in why else "wrong"
+            verdict, text = judge(chosen.program, path, rng, f.relations)
             count[verdict] += 1
-            print(f"{label}: {verdict} {took:.1f} s {why[:1500]}", flush=True)
+            print(f"{label}: {verdict}, {text[:1500]}", flush=True)
     print(dict(count))
     sys.exit(1 if count["wrong"] else 0)
 

@@ -192,14 +192,35 @@ impl<'a> MjcfReader<'a> {
     /// The force limits of an actuator before its gear, N or N m; none if it has no limits.
     fn actuator_range(&self, node: &Node<'a, '_>) -> Result<Option<[f64; 2]>, String> {
         let force = self.limits(node, None, ["forcerange", "forcelimited"])?;
-        // The control of a motor is its force, so that the range of the control limits it too.
-        if node.tag_name().name() == "motor" {
-            return Ok(clamp_range(
-                self.limits(node, None, ["ctrlrange", "ctrllimited"])?,
-                force,
-            ));
+        let Some(gain) = self.constant_gain(node)? else {
+            return Ok(force);
+        };
+        // The force is a multiple of the control, so that the range of the control limits it too.
+        let control = self.limits(node, None, ["ctrlrange", "ctrllimited"])?;
+        Ok(clamp_range(control.map(|range| scale_range(range, gain)), force))
+    }
+
+    /// The factor from the control of an actuator to its force, if the force is a multiple of the control; filters of the
+    /// control do not exceed its range.
+    fn constant_gain(&self, node: &Node<'a, '_>) -> Result<Option<f64>, String> {
+        match node.tag_name().name() {
+            "motor" => return Ok(Some(1.0)),
+            "general" => {}
+            _ => return Ok(None),
         }
-        Ok(force)
+        let is_one_of = |key: &str, usual: &str, known: &[&str]| {
+            Ok::<bool, String>(known.contains(&self.text(node, None, key)?.unwrap_or(usual)))
+        };
+        let is_multiple = is_one_of("gaintype", "fixed", &["fixed"])?
+            && is_one_of("biastype", "none", &["none"])?
+            && is_one_of("dyntype", "none", &["none", "filter", "filterexact"])?;
+        if !is_multiple {
+            return Ok(None);
+        }
+        let Some(text) = self.text(node, None, "gainprm")? else {
+            return Ok(Some(1.0));
+        };
+        Ok(numbers(node, "gainprm", text)?.first().copied())
     }
 
     /// The limits in an attribute; none if another attribute disables them or they are not in ascending order.

@@ -256,6 +256,22 @@ fn limits_of_actuators_and_of_their_joint_both_apply() {
             "<motor joint=\"a_turn\" forcerange=\"-3 4\" ctrlrange=\"-0.5 9\"/>",
             Some("[-0.5, 4.0]"),
         ),
+        // A general actuator is a motor with a gain, if its force is a multiple of its control.
+        (
+            "-10 10",
+            "<general joint=\"a_turn\" ctrlrange=\"-2 3\" gainprm=\"-4\"/>",
+            Some("[-10.0, 8.0]"),
+        ),
+        (
+            "-99 99",
+            "<general joint=\"a_turn\" ctrlrange=\"-2 3\" gainprm=\"4 0 0\" dyntype=\"filter\" gear=\"2\"/>",
+            Some("[-16.0, 24.0]"),
+        ),
+        (
+            "-99 99",
+            "<general joint=\"a_turn\" ctrlrange=\"-2 3\" biastype=\"affine\"/>",
+            Some("[-99.0, 99.0]"),
+        ),
         (
             "-9 9",
             "<motor joint=\"a_turn\" forcerange=\"-3 4\"/><motor joint=\"a_turn\" forcerange=\"-1 3\" gear=\"-1\"/>",
