@@ -153,6 +153,7 @@ impl EvaluationTape {
     }
 
     /// The part that some of the roots need, given by their places.
+    #[must_use]
     pub fn restricted_to(&self, roots: &[usize]) -> Self {
         let mut is_needed = vec![false; self.steps.len()];
         for root in roots {

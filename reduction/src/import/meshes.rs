@@ -1,10 +1,10 @@
-//! Triangle meshes: reads STL and OBJ, and integrates mass, centre and inertia over them.
+//! Triangle meshes: reads STL, OBJ and MSH, and integrates mass, centre and inertia over them.
 //!
 //! The integrals are sums over tetrahedra, one for each triangle, with the triangle as its base (B. Mirtich, "Fast and
 //! accurate computation of polyhedral mass properties", J. of Graphics Tools 1(2), 1996, gives the same integrals by
 //! faces). MuJoCo's three kinds differ in what is summed: see [`MeshInertia`].
 //!
-//! Decision: these are two readers of a few dozen lines and not the crates `stl_io` and `tobj`. Only corners and
+//! Decision: these are three readers of some twenty lines and not the crates `stl_io` and `tobj`. Only corners and
 //! triangles are needed, and memory is reserved for what the bytes hold and not for what they state.
 
 use std::collections::BTreeMap;
@@ -51,7 +51,8 @@ impl TriangleMesh {
         match ending.as_str() {
             "stl" => Self::read_stl(bytes),
             "obj" => Self::read_obj(&String::from_utf8_lossy(bytes)),
-            _ => Err("only meshes in STL and OBJ files are read here".to_owned()),
+            "msh" => Self::read_msh(bytes),
+            _ => Err("only meshes in STL, OBJ and MSH files are read here".to_owned()),
         }
     }
 
@@ -78,6 +79,42 @@ impl TriangleMesh {
             }
             mesh.triangles.push([first, first + 1, first + 2]);
         }
+        mesh.checked()
+    }
+
+    /// Reads an MSH, MuJoCo's own format: numbers of corners, normals, places in a texture and triangles; then all of these,
+    /// as floats and whole numbers of 32 bits.
+    fn read_msh(bytes: &[u8]) -> Result<Self, String> {
+        let words: Vec<[u8; 4]> = (bytes.chunks_exact(4))
+            .filter_map(|four| four.try_into().ok())
+            .collect();
+        let whole = |word: &[u8; 4]| usize::try_from(i32::from_le_bytes(*word)).ok();
+        let layout = || {
+            let counts = words.get(..4)?.iter().map(whole).collect::<Option<Vec<usize>>>()?;
+            let lengths = [3_usize, 3, 2, 3].iter().zip(&counts);
+            let lengths: Vec<usize> = lengths
+                .map(|(each, count)| each.checked_mul(*count))
+                .collect::<Option<_>>()?;
+            let stated: u64 = lengths.iter().map(|length| *length as u64).sum();
+            let is_complete = 4 * (4 + stated) == bytes.len() as u64;
+            let (corners, others) = is_complete.then(|| words[4..].split_at(lengths[0]))?;
+            Some((corners, &others[lengths[1] + lengths[2]..]))
+        };
+        let (corners, places) =
+            layout().ok_or("expected an MSH whose length is that of its stated numbers of corners and triangles")?;
+        let places: Option<Vec<usize>> = places.iter().map(whole).collect();
+        let places = places.ok_or("a triangle of the mesh has a corner that does not exist")?;
+        let numbers: Vec<f64> = corners
+            .iter()
+            .map(|word| f64::from(f32::from_le_bytes(*word)))
+            .collect();
+        let mesh = Self {
+            corners: numbers
+                .chunks_exact(3)
+                .map(|c| Vector3::new(c[0], c[1], c[2]))
+                .collect(),
+            triangles: places.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        };
         mesh.checked()
     }
 
@@ -300,29 +337,43 @@ mod tests {
         assert_near(&of(MeshInertia::Legacy), 208.071_810_602_485_44, place, legacy);
     }
 
-    /// The same body from an OBJ with quadrangles and from an STL, mirrored and moved.
+    /// The same body from each format, also mirrored.
     #[test]
-    fn both_formats_give_one_body() {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "small numbers, and halves"
+    )]
+    fn all_formats_give_one_body() {
         let body = letter();
-        let mut obj: String = body
-            .corners
-            .iter()
-            .fold(String::new(), |text, v| text + &format!("v {} {} {}\n", v.x, v.y, v.z));
-        for [a, b, c] in &body.triangles {
-            obj += &format!("f {}/1/1 {}//2 {}\n", a + 1, b + 1, *c as i64 - 12);
-        }
+        let corners = body.corners.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
+        // The last corner of each triangle is counted from the end.
+        let last = |corner: usize| corner as i64 - 12;
+        let triangles = (body.triangles.iter()).map(|[a, b, c]| format!("f {}/1/1 {}//2 {}\n", a + 1, b + 1, last(*c)));
+        let obj = corners.chain(triangles).collect::<Vec<_>>().concat();
         let mut stl = vec![0; STL_HEADER];
         stl.extend(u32::try_from(body.triangles.len()).unwrap().to_le_bytes());
         for triangle in &body.triangles {
             stl.extend([0; 12]);
             for corner in triangle {
-                #[expect(clippy::cast_possible_truncation, reason = "halves are exact")]
                 stl.extend(body.corners[*corner].iter().flat_map(|x| (*x as f32).to_le_bytes()));
             }
             stl.extend([0; 2]);
         }
+        // One normal and one place in a texture, which are passed over.
+        let mut msh: Vec<u8> = [12, 1, 1, body.triangles.len()]
+            .iter()
+            .flat_map(|n| (*n as i32).to_le_bytes())
+            .collect();
+        let floats = body
+            .corners
+            .iter()
+            .flat_map(|corner| corner.iter().map(|x| *x as f32).collect::<Vec<f32>>());
+        msh.extend(floats.chain([0.0; 5]).flat_map(f32::to_le_bytes));
+        msh.extend(body.triangles.iter().flatten().flat_map(|k| (*k as i32).to_le_bytes()));
         let want = body.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap();
         for mesh in [
+            TriangleMesh::read("l.msh", &msh),
             TriangleMesh::read("l.OBJ", obj.as_bytes()),
             TriangleMesh::read("l.stl", &stl),
         ] {
@@ -334,7 +385,7 @@ mod tests {
             // A mirrored mesh still faces outwards.
             let mirrored = mesh.placed(&DescriptionPose::identity(), [-1.0, 1.0, 1.0]);
             let found = mirrored.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap();
-            assert!((found.at.p.x + want.at.p.x).abs() < 1e-12 && found.mass == 3.0);
+            assert!((found.at.p.x + want.at.p.x).abs() + (found.mass - 3.0).abs() < 1e-12);
         }
     }
 
@@ -345,7 +396,16 @@ mod tests {
         let mut long = vec![0; STL_HEADER];
         long.extend(u32::MAX.to_le_bytes());
         assert!(fault("a.stl", &long).contains("stated number of triangles"));
-        assert!(fault("a.msh", b"").contains("STL and OBJ"));
+        assert!(fault("a.dae", b"").contains("STL, OBJ and MSH"));
+        for words in [&[1, 0, 0, 1, 7][..], &[-1, 0, 0, 0], &[i32::MAX; 4], &[3]] {
+            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            assert!(fault("a.msh", &bytes).contains("expected an MSH"));
+        }
+        let minus: Vec<u8> = [0, 0, 0, 1, -1, 0, 0]
+            .iter()
+            .flat_map(|word: &i32| word.to_le_bytes())
+            .collect();
+        assert!(fault("a.msh", &minus).contains("does not exist"));
         assert!(fault("a.obj", b"v 0 0\n").contains("line 1"));
         assert!(fault("a.obj", b"v 0 0 0\nf 1 1 2\n").contains("line 2"));
         assert!(fault("a.obj", b"v 0 0 nan\nf 1 1 1\n").contains("not finite"));

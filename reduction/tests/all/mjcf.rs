@@ -254,9 +254,8 @@ fn masses_of_meshes_are_those_of_mujoco() {
             .split_whitespace()
             .map(|word| word.parse::<f64>().unwrap() + add)
             .collect();
-        all.chunks(3)
-            .map(|c| format!("{tag} {} {} {}\n", c[0], c[1], c[2]))
-            .collect()
+        let lines = all.chunks(3).map(|c| format!("{tag} {} {} {}", c[0], c[1], c[2]));
+        lines.collect::<Vec<_>>().join("\n") + "\n"
     };
     let obj = triples(corners, "v", 0.0) + &triples(triangles, "f", 1.0);
     let read = |path: &str| match path {
