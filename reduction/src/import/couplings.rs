@@ -154,7 +154,13 @@ fn coupling_rules(
     // Index of a joint by its name.
     let index = |name: &str, line: u32| {
         joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
-            format!("line {line}: the coupling names `{name}`, which is not a revolute or prismatic joint")
+            let mut all = description.links.iter().flat_map(|link| &link.joints);
+            let what = if all.any(|joint| joint.name == name) {
+                "which is not a revolute or prismatic joint"
+            } else {
+                "but there is no joint of this name"
+            };
+            format!("line {line}: the coupling names `{name}`, {what}")
         })
     };
     let mut rules: Vec<Option<CouplingRule>> = vec![None; joints.len()];

@@ -8,6 +8,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::description::DescriptionInertia;
 use super::placed::DescriptionPose;
 
+/// What to do where a mass cannot be computed.
+pub(super) const GIVE_INERTIAL: &str =
+    "give the body an <inertial>, which MuJoCo writes (mj_saveLastXML) with <compiler saveinertial=\"true\"/>";
+
 /// A shape: its volume, and its moments of inertia per mass.
 pub(crate) struct GeomShape {
     /// Volume, m^3.
@@ -84,8 +88,7 @@ impl GeomShape {
             }
             other => {
                 return Err(format!(
-                    "mass and inertia of a {other} are not computed here; give the body an <inertial>, as MuJoCo writes it \
-                     (mj_saveLastXML)"
+                    "mass and inertia of a {other} are not computed here; {GIVE_INERTIAL}"
                 ));
             }
         };

@@ -11,7 +11,7 @@ use roxmltree::{Document, Node};
 use super::description::{
     DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
 };
-use super::geoms;
+use super::geoms::{self, GIVE_INERTIAL};
 use super::mjcf_defaults::MjcfDefaults;
 use super::mjcf_meshes::{LoadedMeshes, MeshFiles, MeshFolder};
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
@@ -51,6 +51,8 @@ pub(super) struct MjcfReader<'a> {
     pub(super) world: Vec<DescriptionPose>,
     /// The bodies by their names, for elements that refer to them.
     pub(super) link_of_name: BTreeMap<String, usize>,
+    /// Bodies that are moved from outside.
+    pub(super) mocap_links: Vec<usize>,
     /// Sites: name, link (none is the world) and pose in it.
     pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
     /// Reads files of meshes; `None` if the description is not a file.
@@ -84,6 +86,7 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
         },
         world: Vec::new(),
         link_of_name: BTreeMap::new(),
+        mocap_links: Vec::new(),
         sites: Vec::new(),
         mesh_files,
         mesh_folder: MeshFolder::read(&root),
@@ -381,6 +384,7 @@ impl<'a> MjcfReader<'a> {
         };
         // Properties of simulation and control are reported, since the model lacks them.
         if node.attribute("mocap") == Some("true") {
+            self.mocap_links.push(own);
             self.out.remarks.push(located_message(
                 node,
                 "this mocap body is moved from outside; it is fixed in the model",
@@ -561,11 +565,8 @@ impl<'a> MjcfReader<'a> {
             return Ok(None);
         }
         if self.text(node, class, "shellinertia")? == Some("true") {
-            return Err(located_message(
-                node,
-                "mass and inertia of a hollow shape are not computed here; give the body an <inertial>, as MuJoCo writes it \
-                 (mj_saveLastXML)",
-            ));
+            let says = format!("mass and inertia of a hollow shape are not computed here; {GIVE_INERTIAL}");
+            return Err(located_message(node, &says));
         }
         // A shape with a mesh has the type of a mesh, if no other is given.
         let usual = match self.text(node, class, "mesh")? {
@@ -577,8 +578,7 @@ impl<'a> MjcfReader<'a> {
         if let Some(mesh) = self.text(node, class, "mesh")? {
             if kind != "mesh" {
                 let says = format!(
-                    "mass and inertia of a {kind} that is fitted to a mesh are not computed here; give the body an <inertial>, \
-                     as MuJoCo writes it (mj_saveLastXML)"
+                    "mass and inertia of a {kind} that is fitted to a mesh are not computed here; {GIVE_INERTIAL}"
                 );
                 return Err(located_message(node, &says));
             }

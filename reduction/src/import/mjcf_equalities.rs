@@ -62,6 +62,17 @@ impl<'a> MjcfReader<'a> {
                 } else {
                     self.body_ends(node, tag)?
                 };
+                if let Some(moved) =
+                    (ends.iter()).find_map(|(link, _)| link.filter(|one| self.mocap_links.contains(one)))
+                {
+                    // A program pulls the other end along; it closes no loop of the mechanism.
+                    let says = format!(
+                        "one end is the mocap body `{}`, which is moved from outside; this equality is left out",
+                        self.out.links[moved].name
+                    );
+                    self.out.remarks.push(located_message(node, &says));
+                    return Ok(());
+                }
                 self.out.closures.push(DescriptionClosure {
                     name,
                     line: line(node),

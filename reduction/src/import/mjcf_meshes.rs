@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 
 use super::description::DescriptionInertia;
+use super::geoms::GIVE_INERTIAL;
 use super::meshes::{MeshInertia, TriangleMesh};
 use super::mjcf::MjcfReader;
 use super::placed::{DescriptionPose, rotation_from_quaternion};
@@ -89,10 +90,7 @@ impl<'a> MjcfReader<'a> {
     /// Reads an entry of `<asset>` with its corners and triangles.
     fn load_mesh(&self, entry: &Node<'a, '_>) -> Result<LoadedMesh, String> {
         let not_computed = |what: &str| {
-            let says = format!(
-                "mass and inertia of {what} are not computed here; give the body an <inertial>, as MuJoCo writes it \
-                 (mj_saveLastXML)"
-            );
+            let says = format!("mass and inertia of {what} are not computed here; {GIVE_INERTIAL}");
             Err(located_message(entry, &says))
         };
         let kind = match self.text(entry, None, "inertia")?.unwrap_or("legacy") {

@@ -105,7 +105,7 @@ pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: boo
             parent: None,
             at: DescriptionPose::identity(),
             joints: Vec::new(),
-            inertial: node.map(inertial).transpose()?.unwrap_or_default(),
+            inertial: (node.map(|node| inertial(node, &mut out.remarks)).transpose()?).unwrap_or_default(),
         };
         // A link gets pose and joints of the joint through which it is reached.
         if let Some(j) = between {
@@ -294,17 +294,21 @@ fn root_link(links: &[Node], joints: &[UrdfJoint], world: Option<&str>) -> Resul
 }
 
 /// The `<inertial>` of a link; zero mass without one.
-fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
+fn inertial(node: &Node, remarks: &mut Vec<String>) -> Result<DescriptionInertia, String> {
     let Some(inertial) = child(node, "inertial") else {
         return Ok(DescriptionInertia::default());
     };
-    // Mass and inertia are required in an `<inertial>`.
     let mass = number_attribute(&required_child(&inertial, "mass")?, "value")?;
-    let inertia = required_child(&inertial, "inertia")?;
     // The six independent entries of the symmetric matrix.
     let mut entries = [0.0; 6];
-    for (entry, key) in entries.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
-        *entry = number_attribute(&inertia, key)?;
+    if let Some(inertia) = child(&inertial, "inertia") {
+        for (entry, key) in entries.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
+            *entry = number_attribute(&inertia, key)?;
+        }
+    } else {
+        // The format requires it, but other readers accept files without.
+        let says = "there is no <inertia>; the mass is a point mass in the model";
+        remarks.push(located_message(&inertial, says));
     }
     Ok(DescriptionInertia {
         mass,

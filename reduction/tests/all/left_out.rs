@@ -476,3 +476,39 @@ fn bodies_have_different_symbols() {
     different.dedup();
     assert_eq!(different.len(), 3, "{symbols:?}\n{model}");
 }
+
+/// A program pulls a mocap body along, so that an equality with it closes no loop of the mechanism.
+#[test]
+fn equalities_with_mocap_bodies_are_named() {
+    let hand = "<body name=\"hand\" mocap=\"true\" pos=\"1 0 0\"/>";
+    let arms = |equality: &str| {
+        let text = two_arms("", ["", ""], equality).replace("</worldbody>", &format!("{hand}</worldbody>"));
+        imported(&text)
+    };
+    let plain = arms("");
+    for weld in [
+        "<equality><weld body1=\"a\" body2=\"hand\"/></equality>",
+        "<equality><connect body1=\"hand\" body2=\"b\" anchor=\"0 0 0\"/></equality>",
+    ] {
+        let result = arms(weld);
+        assert_eq!(result.model, plain.model, "{weld}");
+        assert!(
+            lines(&result.remarks).contains("one end is the mocap body `hand`"),
+            "{weld}"
+        );
+    }
+}
+
+/// Other readers take the mass of an `<inertial>` without `<inertia>` for a point mass.
+#[test]
+fn masses_without_inertia_are_point_masses() {
+    let text = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"><inertial><origin xyz=\"0.5 0 0\"/><mass value=\"2\"/>\
+                </inertial></link><joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/>\
+                <axis xyz=\"0 0 1\"/>MORE</joint></robot>";
+    let result = imported(&text.replace("MORE", ""));
+    assert!(lines(&result.remarks).contains("point mass"), "{:?}", result.remarks);
+    assert!(result.model.contains("ZZ = 0.5, MX = 1.0"), "{}", result.model);
+    let coupled = text.replace("MORE", "<mimic joint=\"lost\"/>");
+    let fault = import(&coupled, &ImportOptions::default()).unwrap_err().to_string();
+    assert!(fault.contains("`lost`, but there is no joint of this name"), "{fault}");
+}
