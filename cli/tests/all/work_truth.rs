@@ -157,7 +157,15 @@ fn a_pose_is_kept_and_its_limits_are_those_of_the_file() {
          await until('a picture', () => at('picture').dataset.drawn);
          const set = (input, value) => { input.value = value; input.dispatchEvent(new Event('input')); };
          await drawn(() => set(inputs[0], Number(inputs[0].value) + 0.05));
-         const value = inputs[0].value, picture = at('picture').innerHTML;
+         // An answer to an earlier request may be drawn first, so the picture is that which stays.
+         const settled = async () => {
+           for (;;) {
+             const shown = at('picture').innerHTML;
+             await new Promise((done) => setTimeout(done, 500));
+             if (at('picture').innerHTML === shown) { return shown; }
+           }
+         };
+         const value = inputs[0].value, picture = await settled();
          select('nominal = 12.4560');
          document.execCommand('insertText', false, 'nominal = 12.5560');
          await until('the edit', () => at('base').querySelectorAll('tr.changed').length);
