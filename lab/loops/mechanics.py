@@ -472,6 +472,6 @@ class Mechanism:
                 else:
                     poses = self.poses(values)
                     d = self.point(drive["linear"]["to"], poses) - self.point(drive["linear"]["from"], poses)
-                    row.append(float(d.a @ d.b / np.linalg.norm(d.a)))
+                    row.append(float(d.a @ d.b / SQRT(d.a @ d.a)))
             out.append(row)
         return np.array(out)
