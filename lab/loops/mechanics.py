@@ -345,7 +345,7 @@ class Mechanism:
         return np.array([x, xd, xdd]), ofs
 
     def least_squares(self, phi, right):
-        """Solution of redundant equations: by the pseudo-inverse in double precision, corrected in the numbers of the file."""
+        """Solution of redundant equations: by the pseudo-inverse in double precision, corrected with all digits."""
         inverse = np.linalg.pinv(as_doubles(phi), rcond=1e-9)
         x = inverse @ right
         for _ in range(self.precision.n_corrections):
