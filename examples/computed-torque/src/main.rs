@@ -64,7 +64,11 @@ fn report(rig: &modelmill_rig::Rig, task: &ReferenceMotion) -> Result<Vec<String
                 Err(error) => Err(error.to_string()),
             })
         });
-        let joined = threads.map(|thread| thread.join().unwrap_or_else(|_| Err("a simulation panicked".to_owned())));
+        let joined = threads.map(|thread| {
+            thread
+                .join()
+                .unwrap_or_else(|_| Err("a simulation panicked".to_owned()))
+        });
         joined.into()
     });
     for ((name, _), error) in controllers.iter().zip(runs) {

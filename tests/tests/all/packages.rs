@@ -94,7 +94,10 @@ fn crates_without_a_test_program_have_no_unit_tests() {
 /// Whether the documentation of a library holds code that `rustdoc` would run.
 fn has_documented_examples(folder: &Path) -> bool {
     let opens_code = |line: &str| {
-        let comment = line.trim_start().strip_prefix("///").or(line.trim_start().strip_prefix("//!"));
+        let comment = line
+            .trim_start()
+            .strip_prefix("///")
+            .or(line.trim_start().strip_prefix("//!"));
         let language = comment.and_then(|comment| comment.trim_start().strip_prefix("```"));
         language.is_some_and(|language| !["text", "sql", "toml", "sh", "json"].contains(&language.trim()))
     };
@@ -103,7 +106,11 @@ fn has_documented_examples(folder: &Path) -> bool {
         // The same line closes a block, so blocks of another language are passed over as a whole.
         let mut is_open = false;
         text.lines().any(|line| {
-            let is_fence = line.trim_start().trim_start_matches(['/', '!']).trim_start().starts_with("```");
+            let is_fence = line
+                .trim_start()
+                .trim_start_matches(['/', '!'])
+                .trim_start()
+                .starts_with("```");
             let is_comment = line.trim_start().starts_with("//");
             if !(is_fence && is_comment) {
                 return false;
