@@ -17,7 +17,7 @@ use crate::expr::{Atom, ExprId, Graph};
 use crate::loops::magnitude::LoopSize;
 use crate::lower::{LoweringRequest, StraightLineProgram, lower};
 use crate::programs::closing::PassiveClosure;
-use crate::reduce::{BaseReduction, ReductionMethod, base};
+use crate::reduce::{BaseReduction, base};
 use crate::regressor::UnreducedEquations;
 use crate::tree::expressions::ParameterMonomial;
 
@@ -117,11 +117,7 @@ pub(crate) fn programs(
     } else {
         let mut outputs = projection.loops.residual.clone();
         outputs.extend(projection.residual_jacobian.iter().flatten());
-        let change = match &reduction.method {
-            ReductionMethod::Numeric { constant_change, .. } => constant_change.unwrap_or(0.0),
-            ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => 0.0,
-        };
-        let scales = scales::residual_scales(graph, mechanism, &projection.loops, change);
+        let scales = scales::residual_scales(graph, mechanism, &projection.loops);
         PassivePosition::Newton(Box::new(LoopPrograms {
             residual: plain_program(graph, &outputs),
             scales: plain_program(graph, &scales),
