@@ -378,7 +378,7 @@ def closed(f, rng):
 def check(program, path):
     done = subprocess.run([program, "check", str(path), "--json", "--time-limit", "200"], capture_output=True, text=True)
     if done.returncode:
-        return None, done.stderr + done.stdout[:2000]
+        return None, done.stderr or done.stdout[:2000]
     return json.loads(done.stdout), done.stderr
 
 

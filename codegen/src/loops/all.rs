@@ -26,6 +26,8 @@ pub(crate) struct KinematicLoops {
     pub(crate) closures: Vec<LoopClosure>,
     /// Independent residuals, as many as there are passive coordinates.
     pub(crate) residual: Vec<ExprId>,
+    /// Residuals that are zero wherever the selected ones are, in the assembly of the nominal pose; elsewhere they may not be.
+    pub(crate) dependent_residual: Vec<ExprId>,
     /// Angles of which others are fractions, with the number of parts into which the field divides them.
     pub(crate) divided: Vec<(usize, i64)>,
 }
@@ -45,9 +47,11 @@ impl KinematicLoops {
         let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
         // Dependent equations are dropped: first linear dependences, then others that show in numbers.
         let mut residual = independent_residuals(graph, &residual)?;
+        let mut dependent_residual = Vec::new();
         if residual.len() > passive.len()
             && let Some(enough) = sufficient_residuals(graph, mechanism, &residual, passive.len())
         {
+            dependent_residual = residual.into_iter().filter(|r| !enough.contains(r)).collect();
             residual = enough;
         }
         // Each closure counts the selected equations that no closure before it has.
@@ -68,6 +72,7 @@ impl KinematicLoops {
             passive,
             closures,
             residual,
+            dependent_residual,
             divided: couplings.divided,
         })
     }

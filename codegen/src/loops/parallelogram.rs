@@ -135,6 +135,7 @@ impl PriorLoops {
                 active,
                 passive,
                 residual: closures.iter().flat_map(|c| c.residual.clone()).collect(),
+                dependent_residual: Vec::new(),
                 closures,
                 divided: divided.to_vec(),
             })
