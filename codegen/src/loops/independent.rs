@@ -40,6 +40,8 @@ pub(super) fn sufficient_residuals(
 ) -> Option<Vec<ExprId>> {
     /// Number of poses in addition to the nominal one.
     const POSES: usize = 6;
+    /// Number of draws for them: in some directions the loops end near the nominal pose.
+    const DRAWS: usize = 24;
     /// How far away these are, in rad or relative to the largest loop equation.
     const REACH: f64 = 0.05;
     /// How often the distance to a pose may be halved where a loop ends before it. At the least distance an equation
@@ -53,8 +55,10 @@ pub(super) fn sufficient_residuals(
     let loops = NumericLoops::new(graph, mechanism, residual);
     let mut stream = RandomStream::new(5);
     let mut poses = vec![loops.closed_nominal_pose()?];
-    for _ in 0..POSES {
-        poses.push(loops.random_pose_within(REACH, HALVINGS, &mut stream)?);
+    let drawn = (0..DRAWS).filter_map(|_| loops.random_pose_within(REACH, HALVINGS, &mut stream));
+    poses.extend(drawn.take(POSES));
+    if poses.len() <= POSES {
+        return None;
     }
     // Full rank by the passive coordinates.
     let is_regular = |jacobian: &DMatrix<f64>| {

@@ -23,7 +23,8 @@ const LONGEST_STEP: f64 = 0.15;
 const STEP_SHARE: f64 = 0.5;
 /// Nearer than this to a pose where branches meet, the walk turns back.
 const BRANCH_DISTANCE: f64 = 2e-3;
-/// The same as a share of the distance at the nominal pose, if that is near such a pose itself.
+/// The same as a share of the distance at the nominal pose, if this is nearer: mechanisms with loops of unequal size are
+/// always near such poses.
 const NOMINAL_BRANCH_SHARE: f64 = 0.3;
 /// A step was too long if it reduces the least singular value to less than this share.
 const ACCEPTED_DECREASE: f64 = 0.25;
@@ -38,7 +39,7 @@ pub(crate) const NEARLY_CLOSED: f64 = 1e-7;
 /// Least singular value by the passive coordinates, relative to the largest, above which they count as determined:
 /// below it their rates are mostly rounding errors.
 const SINGULAR_RATIO: f64 = 1e-3;
-/// The same as a share of the value at the nominal pose, if that pose is nearly singular itself.
+/// The same as a share of the value at the nominal pose, if this is lower.
 const NOMINAL_SINGULAR_SHARE: f64 = 0.1;
 
 /// The state of a walk: its pose, its direction, and what it compares residuals and steps with.
@@ -114,14 +115,11 @@ impl<'a> PoseWalk<'a> {
         walk.nominal.clone_from(&walk.q);
         // Near a branch point, steps and limits are relative to the nominal pose.
         let least = walk.loop_tangent(&walk.q)?.least;
-        if least < BRANCH_DISTANCE {
+        if NOMINAL_BRANCH_SHARE * least < walk.near {
             walk.trusted = Some(STEP_SHARE * least);
             walk.near = NOMINAL_BRANCH_SHARE * least;
         }
-        let determined_by = walk.relative_singular_value()?;
-        if determined_by < SINGULAR_RATIO {
-            walk.dead = NOMINAL_SINGULAR_SHARE * determined_by;
-        }
+        walk.dead = walk.dead.min(NOMINAL_SINGULAR_SHARE * walk.relative_singular_value()?);
         Some(walk)
     }
 
