@@ -5,6 +5,7 @@ use modelmill_identify::{
     BandError, DriveResidual, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions,
     RateDependence, RecordingNote, TIME_COLUMN, add_filtered_forces, find_rate_dependence, locate_errors,
 };
+use modelmill_spec::DriveKind;
 
 use crate::along::{self, interleave, variables};
 use crate::error::Outcome;
@@ -247,7 +248,7 @@ fn region_sentence(model: &Model, region: &ErrorRegion) -> String {
         "{:.0} % of the squared error of {} is in the samples with {} {} ({:.0} % of all samples)",
         100.0 * region.share,
         region.channel,
-        region.variable,
+        variable_phrase(model, &region.variable),
         region_range(region, &variable_unit(model, &region.variable)),
         100.0 * region.samples
     )
@@ -262,6 +263,24 @@ pub(crate) fn region_range(region: &ErrorRegion, unit: &str) -> String {
     let [low, high] = [low, high].map(|end| significant(end, 3));
     let separator = if unit.is_empty() { "" } else { " " };
     format!("between {low} and {high}{separator}{unit}{around}")
+}
+
+/// A variable in words by its name: `the length of spindle_left` for `spindle_left_length`. Coordinates, their rates
+/// and accelerations, and the time keep their names.
+pub(crate) fn variable_phrase(model: &Model, name: &str) -> String {
+    let mut drives = model.derivation.mechanism.drives.iter().enumerate();
+    let phrase = drives.find_map(|(d, drive)| {
+        let is_linear = matches!(drive.kind, DriveKind::Linear { .. });
+        let quantity = match name.strip_prefix(drive.name.as_str())? {
+            "" if model.force_unit(d) == "N" => "force",
+            "" => "torque",
+            "_length" if is_linear => "length",
+            "_d" if is_linear => "velocity",
+            _ => return None,
+        };
+        Some(format!("the {quantity} of {}", drive.name))
+    });
+    phrase.unwrap_or_else(|| name.to_owned())
 }
 
 /// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the

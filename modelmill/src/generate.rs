@@ -46,7 +46,7 @@ impl CodeLanguage {
         self.0.output_form()
     }
 
-    /// Whether reactions and a self-test can be generated in it.
+    /// Whether all optional functions can be generated in this language: joint reactions and a self-test.
     pub fn has_all(self) -> bool {
         self.0.has_reactions_and_self_test()
     }

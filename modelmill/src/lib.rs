@@ -8,10 +8,10 @@
 //! A physical effect adds forces to those of the bodies, such as friction of a drive or inertia of a rod. A library of
 //! effects defines kinds of effects; one is built in.
 //!
-//! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. A [`print::StepSpelling`]
-//! formats the recommended next steps, such as adding an effect to the model file: as a command, as a Python call, or
-//! in words for a caller of this Rust library ([`print::LibrarySpelling`]; the name does not refer to a library of
-//! effects).
+//! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. Their recommendations, such
+//! as adding an effect to the model file, are written in the syntax of the caller. A [`print::StepSpelling`] chooses
+//! it: commands of the program, Python calls, or words for callers of this Rust library
+//! ([`print::LibrarySpelling`]).
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
 //! own values.

@@ -203,7 +203,7 @@ pub trait RemedySpelling {
     }
 }
 
-/// The spelling for callers of the Rust library `modelmill`; the name does not refer to a library of effects.
+/// The spelling for callers of the Rust library `modelmill`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LibrarySpelling;
 

@@ -28,6 +28,8 @@ pub(crate) struct KinematicLoops {
     pub(crate) residual: Vec<ExprId>,
     /// Residuals that are zero wherever the selected ones are, in the assembly of the nominal pose; elsewhere they may not be.
     pub(crate) dependent_residual: Vec<ExprId>,
+    /// The largest value of a residual at closed poses near the nominal one, relative to the size of the loops.
+    pub(crate) contradiction: f64,
     /// Angles of which others are fractions, with the number of parts into which the field divides them.
     pub(crate) divided: Vec<(usize, i64)>,
 }
@@ -47,12 +49,13 @@ impl KinematicLoops {
         let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
         // Dependent equations are dropped: first linear dependences, then others that show in numbers.
         let mut residual = independent_residuals(graph, &residual)?;
-        let mut dependent_residual = Vec::new();
+        let (mut dependent_residual, mut contradiction) = (Vec::new(), 0.0);
         if residual.len() > passive.len()
             && let Some(enough) = sufficient_residuals(graph, mechanism, &residual, passive.len())
         {
-            dependent_residual = residual.into_iter().filter(|r| !enough.contains(r)).collect();
-            residual = enough;
+            residual = enough.selected;
+            dependent_residual = enough.dependent;
+            contradiction = enough.contradiction;
         }
         // Each closure counts the selected equations that no closure before it has.
         let mut left = residual.clone();
@@ -73,6 +76,7 @@ impl KinematicLoops {
             closures,
             residual,
             dependent_residual,
+            contradiction,
             divided: couplings.divided,
         })
     }

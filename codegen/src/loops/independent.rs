@@ -24,6 +24,17 @@ pub(super) fn independent_residuals(graph: &Graph, residual: &[ExprId]) -> Resul
     Ok(columns.into_iter().map(|i| residual[i]).collect())
 }
 
+/// As many equations as there are passive coordinates, and those that depend on them.
+pub(super) struct SufficientResiduals {
+    /// The selected residuals, in their order.
+    pub(super) selected: Vec<ExprId>,
+    /// The other ones.
+    pub(super) dependent: Vec<ExprId>,
+    /// The largest value of any residual at poses near the nominal one, relative to the size of the loops: rounding, and
+    /// the contradiction of rounded lengths.
+    pub(super) contradiction: f64,
+}
+
 /// As many residuals as there are passive coordinates, if the others depend on them. For example, two points on the
 /// axis of a joint that both coincide with two others give one equation too many, because their distance is equal on
 /// both sides.
@@ -37,7 +48,7 @@ pub(super) fn sufficient_residuals(
     mechanism: &Mechanism,
     residual: &[ExprId],
     n_passive: usize,
-) -> Option<Vec<ExprId>> {
+) -> Option<SufficientResiduals> {
     /// Number of poses in addition to the nominal one.
     const POSES: usize = 6;
     /// Number of draws for them: in some directions the loops end near the nominal pose.
@@ -66,13 +77,15 @@ pub(super) fn sufficient_residuals(
         values.len() == n_passive && values.min() > SINGULAR * values.max()
     };
     let mut chosen: Option<Vec<usize>> = None;
+    let mut contradiction = 0.0_f64;
     for q in &poses {
         let (gaps, mut jacobian) = loops.linearise(q)?;
         let passive = (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
         for (mut column, i) in jacobian.column_iter_mut().zip(passive) {
             column *= loops.coordinate_unit(i);
         }
-        if gaps.amax() > CLOSED * size || !is_regular(&jacobian) {
+        contradiction = contradiction.max(gaps.amax() / size);
+        if contradiction > CLOSED || !is_regular(&jacobian) {
             return None;
         }
         // Rows are selected at the nominal pose and must be sufficient at all poses.
@@ -81,7 +94,14 @@ pub(super) fn sufficient_residuals(
             return None;
         }
     }
-    Some(chosen?.into_iter().map(|i| residual[i]).collect())
+    let rows = chosen?;
+    let (selected, dependent): (Vec<usize>, Vec<usize>) = (0..residual.len()).partition(|i| rows.contains(i));
+    let of = |rows: Vec<usize>| rows.into_iter().map(|i| residual[i]).collect();
+    Some(SufficientResiduals {
+        selected: of(selected),
+        dependent: of(dependent),
+        contradiction,
+    })
 }
 
 /// Rows of a matrix that span its row space well, at most `n`: each time the row with the largest norm orthogonal to

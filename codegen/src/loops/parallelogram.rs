@@ -136,6 +136,7 @@ impl PriorLoops {
                 passive,
                 residual: closures.iter().flat_map(|c| c.residual.clone()).collect(),
                 dependent_residual: Vec::new(),
+                contradiction: 0.0,
                 closures,
                 divided: divided.to_vec(),
             })

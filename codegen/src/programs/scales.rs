@@ -8,9 +8,15 @@ use crate::expr::{ExprId, Graph, Rational, Unary, coordinates_of, nominal_value}
 use crate::loops::KinematicLoops;
 use crate::loops::magnitude::{expression_magnitude, nominal_magnitude};
 
-/// A dependent residual counts as zero up to one part in so many of its size. By judgement: lengths that contradict
-/// each other by measurement are off by less, and another assembly soon by more.
-const CONTRADICTION: i64 = 1000;
+/// A dependent residual counts as zero up to this share of its size. By judgement: nearer to a pose at which assemblies
+/// meet they cannot be told from each other.
+const CLOSED: f64 = 1e-7;
+
+/// The same as a multiple of the contradiction at the nominal pose: rounded lengths contradict each other more elsewhere.
+const CONTRADICTION_SHARE: f64 = 1e3;
+
+/// Largest limit that these two may give, as a share of the size.
+const WIDEST: f64 = 1e-3;
 
 /// A dependent residual is compared where its size is at least this share of the size of all loops. Smaller ones are the
 /// rounding of lengths that cancel each other, which no sum of forces depends on.
@@ -44,7 +50,11 @@ pub(crate) fn residual_scales(graph: &mut Graph, mechanism: &Mechanism, loops: &
         }
     }
     if let (Some(first), false) = (scales.first_mut(), sizes.is_empty()) {
-        let factor = one_if_all_small(graph, &sizes);
+        let factor = one_if_all_small(
+            graph,
+            &sizes,
+            (CONTRADICTION_SHARE * loops.contradiction).clamp(CLOSED, WIDEST),
+        );
         *first = graph.mul(factor, *first);
     }
     for i in loops.passive.iter().chain(&loops.active) {
@@ -60,9 +70,10 @@ pub(crate) fn residual_scales(graph: &mut Graph, mechanism: &Mechanism, loops: &
     scales
 }
 
-/// 1 where all residuals are small relative to their sizes, and a negative number elsewhere.
-fn one_if_all_small(graph: &mut Graph, residuals: &[(ExprId, ExprId)]) -> ExprId {
-    let limit = Rational::new(1, CONTRADICTION);
+/// 1 where all residuals are below the share `limit` of their sizes, and a negative number elsewhere.
+fn one_if_all_small(graph: &mut Graph, residuals: &[(ExprId, ExprId)], limit: f64) -> ExprId {
+    #[expect(clippy::cast_possible_truncation, reason = "at most 1e7")]
+    let limit = Rational::new(1, limit.recip().round() as i64);
     let mut sum = Graph::ZERO;
     for (residual, size) in residuals {
         let most = graph.scale(*size, &limit);

@@ -112,7 +112,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
             let in_unit = c.motion.unit();
             // Angles are in rad, lengths in m.
             let kind = if c.motion.is_angle() { "angle" } else { "length" };
-            // Coupled and passive coordinates are computed; all others are inputs.
+            // Coupled and passive coordinates are computed. All others, the active ones, are independent inputs.
             let role = if follows(i) {
                 "passive, coupled to others"
             } else if c.passive {

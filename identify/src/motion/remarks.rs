@@ -61,7 +61,7 @@ impl SignalRecording {
         if let Some(repeats) = &run.repeatability {
             run.notes.push(RecordingNote::info(format!(
                 "The motion in {} repeats itself every {} s, {} times in all. From period to period the forces differ by \
-                 {:.3} % of their rms value: noise, and all else that does not repeat.",
+                 {:.3} % of their rms value. This part is non-repeatable (noise, drift): no function of the state explains it.",
                 self.file(),
                 seven_digits(period),
                 repeats.periods,
@@ -76,11 +76,11 @@ impl SignalRecording {
         // Residuals of rates are marked, because these were fitted if they are recorded.
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
             let derivative = if column.qd.is_some() { "_d" } else { "" };
-            format!("{noise:.2e} of `{}{derivative}`", column.name)
+            format!("`{}{derivative}` {noise:.2e}", column.name)
         });
         message!(
             "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, because its residual is \
-             white noise: {} (RMS). Use {} to filter instead.",
+             white noise (rms, in SI units: {}). Use {} to filter instead.",
             backquoted_list(&names),
             self.file(),
             seven_digits(found.period),

@@ -1,7 +1,7 @@
 //! The paper's situation put to the tool: parameters from CAD, which are fixed, and recordings of a robot whose contact
 //! points are beside the axes of the cranks. The diagnosis has no hint which mass or length is wrong.
 
-use modelmill::diagnose::{DiagnosisOptions, FixedParameters, MissingEffect};
+use modelmill::diagnose::{DiagnosisOptions, FixedParameters, MissingEffect, words};
 use modelmill::recording::RecordingOptions;
 use modelmill::segment::RecordingSegment;
 use modelmill::{Model, Outcome};
@@ -48,7 +48,7 @@ impl HeldDiagnosis {
             alternatives: distance
                 .iter()
                 .flat_map(|one| &one.indistinguishable_from)
-                .map(|one| format!("{} ({})", one.kind.replace('_', " "), one.at.join(", ")))
+                .map(words::effect)
                 .collect(),
         })
     }

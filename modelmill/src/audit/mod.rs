@@ -1,6 +1,6 @@
 //! Checks of a recording with the model, before any result is computed: delays between force and motion, forces that
-//! were measured before a gear, contacts and pushes. All findings become notes. Wrong columns and the direction of
-//! gravity are faults of recordings, which have a list of their own in `faults`.
+//! were measured on the motor side of a gear, contacts and pushes. All findings become notes. Wrong columns and the
+//! direction of gravity are faults of recordings, which have a list of their own in `faults`.
 
 mod delay;
 pub(crate) mod events;
@@ -24,7 +24,7 @@ const ROWS_LOOKED_AT: usize = 12_000;
 /// Smallest number of samples, even for many drives.
 const FEWEST_LOOKED_AT: usize = 300;
 
-/// Notes on forces before a gear, or on delays if there are none.
+/// Notes on forces measured on the motor side of a gear, or on delays if there are none.
 pub(crate) fn examine_forces(
     model: &Model,
     data: &RecordingSegment,

@@ -14,8 +14,8 @@ fn correlation_and_ratio(one: &[f64], other: &[f64]) -> (f64, f64) {
     (dot(one, other) / (sizes[0] * sizes[1]), sizes[0] / sizes[1])
 }
 
-/// The factor by which a measured force is smaller than the nominal one, as a motor torque before its gear or a motor
-/// current is, with its sign; `None` if they agree or are unrelated.
+/// The factor by which a measured force is smaller than the nominal one, as a torque on the motor side of a gear or a
+/// motor current is, with its sign; `None` if they agree or are unrelated.
 pub(super) fn gear_factor(measured: &[f64], nominal: &[f64]) -> Option<f64> {
     let (correlation, ratio) = correlation_and_ratio(measured, nominal);
     let is_clear = correlation.is_finite() && correlation.abs() >= NOMINAL_LEAST_CORRELATION;
@@ -43,7 +43,7 @@ fn column_query_text(drives: &[(&ModelDrive, f64)], file: &str) -> String {
         .collect();
     format!(
         "Compared with the nominal values, forces in {file} are smaller by a factor typical of a gear: {}. If a column is \
-         the motor's torque before its gear, declare it under `[recording.torque]` of the model file with the true ratio, as \
+         the torque on the motor side of the gear, declare it under `[recording.torque]` of the model file with the true ratio, as \
          in {}. If it is a current, also give its `constant` in N m per ampere (or N per ampere). Otherwise all base \
          parameters are estimated too small by this factor.",
         each.join(", "),

@@ -97,7 +97,7 @@ pub fn disturbance(one: &Disturbance) -> String {
                 .map(|value| format!("{} Hz", significant(value.value, 4)))
                 .collect();
             format!(
-                "{at} has hum of {} at {}: it is periodic in time and not a function of the state",
+                "{at} has a sinusoidal disturbance (hum) of {} at {}: it is periodic in time and not a function of the state",
                 value("amplitude"),
                 frequencies.join(" and ")
             )

@@ -45,7 +45,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
     let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[ForceColumn; 3]>)| {
         let [by_position, ..] = slopes.as_ref()?;
         let mut column = ForceColumn(vec![None; model.drives().len()]);
-        // Forces are those of the true motion.
+        // The shift is the recorded minus the true position: forces are those of the true motion.
         column.add(-1.0, by_position);
         Some(CandidateEffect {
             source: ColumnSource::Columns(vec![ColumnChoice {

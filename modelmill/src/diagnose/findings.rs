@@ -102,9 +102,9 @@ pub struct DiagnosisFindings {
     /// Errors of the geometry that explain as much as the effects in [`Self::missing`] together, the best first.
     /// Zeros that the model file writes as coordinates of points are among them.
     pub geometry_alternatives: Vec<GeometryAlternative>,
-    /// Regions of large error for the report: ranges of a coordinate, rate, load or time. If the verdict is
-    /// [`DiagnosisVerdict::Unexplained`], the error is the residual of the unexplained drives. Otherwise it is the
-    /// error of the given model, as in `places`.
+    /// The regions of large error that text and JSON report: ranges of a coordinate, velocity, load or time. If the
+    /// verdict is [`DiagnosisVerdict::Unexplained`], they are regions of the residual of the unexplained drives.
+    /// Otherwise they are the regions in [`Self::places`].
     pub regions: Vec<ErrorRegion>,
     /// The given model, without added effects: its fit, and its forces along all recordings.
     pub before: ModelVersion,
@@ -114,10 +114,10 @@ pub struct DiagnosisFindings {
     pub entries: Vec<NewEffect>,
     /// The text of the given model file with these entries added; `None` if there are none or they cannot be added.
     pub edited: Option<CompletedModelFile>,
-    /// Where the error of the given model is large: ranges of a coordinate, rate, load or time, not places of the
-    /// mechanism. Their share of the squared error is larger than their share of the samples.
+    /// Where the error of the given model (without added effects) is large, whatever the verdict is: ranges of a
+    /// coordinate, velocity, load or time. Their share of the squared error is larger than their share of the samples.
     pub places: ErrorLocations,
-    /// The same for the model with the effects found; `None` if there is no such model.
+    /// Where the error of the model with the effects found is large; `None` if there is no such model.
     pub residual_locations: Option<ErrorLocations>,
     /// The data on which errors are evaluated: validation runs, or cross-validation.
     pub validation: ValidationMethod,

@@ -47,7 +47,8 @@ use crate::regressors::{SegmentList, regressor};
 /// Which base parameters are fixed at their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FixedParameters {
-    /// Only those that are known: they contain no dynamic parameter, see [`Model::is_known`].
+    /// Only those whose value is known because their expression contains no dynamic parameter, only constants and
+    /// numbers ([`Model::is_known`]). All others are estimated.
     Known,
     /// All base parameters, with one exception: if the values of the model come from a fit with a covariance
     /// ([`Model::with_fit`]), they are not fixed but estimated, with values and covariance of the fit as a prior.

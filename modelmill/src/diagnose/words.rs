@@ -49,12 +49,14 @@ impl ValidationMethod {
     }
 }
 
-/// The name of a kind in words: `coulomb friction` for `coulomb_friction`. Two names of the library need a
-/// description.
+/// The name of a kind in words: `coulomb friction` for `coulomb_friction`. Some names need a description.
 pub fn kind(name: &str) -> String {
     match name {
+        "constant_error" => "wrong length or angle".to_owned(),
+        "lumped_mass_placement" => "moment of a misplaced lumped mass".to_owned(),
+        "periodic_in_time" => "sinusoidal disturbance".to_owned(),
         "two_point_element" => "spring or damper between two points".to_owned(),
-        "untied_part" => "separate parameters of one part".to_owned(),
+        "untied_part" => "parameters of its own instead of shared ones".to_owned(),
         _ => name.replace('_', " "),
     }
 }
@@ -183,7 +185,22 @@ pub fn step_text(step: &SelectionStep, diagnosis: &ModelDiagnosis, channels: &[S
             .iter()
             .map(|one| format!("+ refinement of the change in time ({})", one.at.join(", "))),
     );
-    says.extend(named(&step.dropped).iter().map(|name| format!("− {name}")));
+    // An effect that an earlier step added is removed for one of these reasons.
+    let is_possible = |one: &LocatedEffect| diagnosis.possible_effects.iter().any(|found| found.effect == *one);
+    let is_unlikely = |one: &LocatedEffect| step.added.is_empty() && is_possible(one);
+    let (unlikely, unnecessary): (Vec<LocatedEffect>, Vec<LocatedEffect>) =
+        step.dropped.iter().cloned().partition(is_unlikely);
+    let why = if step.added.is_empty() {
+        "not clearly needed"
+    } else {
+        "replaced"
+    };
+    says.extend(
+        named(&unlikely)
+            .iter()
+            .map(|name| format!("− {name}: less likely than not")),
+    );
+    says.extend(named(&unnecessary).iter().map(|name| format!("− {name}: {why}")));
     says.join(" ")
 }
 
@@ -199,7 +216,10 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
         // The figure is of all recordings together, so the error of one of them may be larger.
-        format!("The forces are noise-free: rounding causes an error of {floor} (rms over all recordings).")
+        format!(
+            "The forces are noise-free: rounding causes an error of {floor} (rms over all recordings; a single one can have \
+             more)."
+        )
     } else {
         format!("The noise is {floor} of the force.")
     }
@@ -226,13 +246,15 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter if has_findings => {
-            "explains less of the remaining error than another candidate"
+            "with the effects found, it explains less of the residual than another candidate"
         }
         RejectionReason::ExplainedBetter => "explains less of the error than another candidate",
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
-        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing in addition to the effects found",
+        RejectionReason::ExplainsNothing if has_findings => {
+            "with the effects found, it explains almost nothing of the residual"
+        }
         RejectionReason::ExplainsNothing => "explains almost none of the error",
         RejectionReason::OnlyNoiseRemains => "only noise remains",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
@@ -354,8 +376,8 @@ fn unexplained_verdict(
     };
     let mut says = match (found, sits.is_empty()) {
         ([], true) if has_change_in_time(diagnosis) => vec![format!(
-            "No single set of parameters explains a whole recording: the error {} is {} of the force, and {error} with the \
-             changes below. {noise}",
+            "No single set of parameters explains a complete recording: the error {} is {} of the force. With changes during the \
+             recordings, it is {error}. {noise}",
             judged.phrase(),
             percent(diagnosis.steps.first().map(|first| first.check))
         )],
@@ -463,6 +485,14 @@ fn changes_in_time(diagnosis: &ModelDiagnosis) -> Vec<String> {
 /// Whether something changes within a recording.
 pub(crate) fn has_change_in_time(diagnosis: &ModelDiagnosis) -> bool {
     diagnosis.disturbances.iter().any(is_change_in_time)
+}
+
+/// Whether changes within recordings explain the complete error: no effect is missing, and nothing else is unexplained.
+pub(crate) fn has_only_changes_in_time(diagnosis: &ModelDiagnosis) -> bool {
+    diagnosis.effects.is_empty()
+        && diagnosis.unexplained.is_empty()
+        && diagnosis.time_residuals.is_empty()
+        && has_change_in_time(diagnosis)
 }
 
 /// Whether a disturbance is a change within a recording.

@@ -66,9 +66,9 @@ pub struct EffectDistance {
     pub rival: usize,
     /// Constants of the nearest alternative.
     pub constants: Vec<(String, f64)>,
-    /// The distance, rms over all drives, N or N m: the smaller of two residuals. The first is that of the effect after
-    /// a fit of the nearest alternative. The second is that of the alternative after a fit of the effect. Only the
-    /// first counts if the alternative is a special case of the effect.
+    /// The force by which the effect and its nearest alternative differ, rms over all drives, N or N m. It is the
+    /// smaller of two residuals: that of the effect after a fit of the alternative, and that of the alternative after a
+    /// fit of the effect. If the alternative is a special case of the effect, it is the first of them.
     pub force: f64,
 }
 

@@ -19,7 +19,7 @@ use super::{SimulationCursor, fastest_rate, rollout};
 /// Position errors of a simulated model over several horizons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForwardComparison {
-    /// Names of the independent coordinates.
+    /// Names of the active (independent) coordinates, as in [`Model::active_coordinates`].
     pub coordinates: Vec<String>,
     /// Whether each coordinate is an angle (rad) or a length (m).
     pub is_angle: Vec<bool>,

@@ -19,7 +19,7 @@ pub struct EstimatorOptions {
     pub standstill: Option<f64>,
 }
 
-/// Weights of the equations, one equation per drive and sample. A channel is the force of one drive.
+/// Weights of the equations in a fit. There is one equation for each drive and sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EquationWeights {
     /// [`Self::Channels`] if drives have different units, or if cut-off and decimation were chosen automatically;
@@ -28,7 +28,8 @@ pub enum EquationWeights {
     Automatic,
     /// Equal weights: ordinary least squares.
     None,
-    /// Equations of each drive are divided by the standard deviation of its residuals. Fit and weights are iterated.
+    /// One weight for each drive: its equations are divided by the standard deviation of its residuals. Fit and weights
+    /// are iterated. ("Channel" is the force signal of one drive.)
     Channels,
     /// Each equation is divided by the standard deviation of its measured force: the square root of the variance in the
     /// column `DRIVE_var` of the recording.

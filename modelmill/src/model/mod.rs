@@ -54,9 +54,9 @@ pub struct Model {
     pub derivation: Arc<Derivation>,
     /// The base parameters, eq. (16), with names, expressions and units.
     pub base: Vec<BaseParameterEntry>,
-    /// The current values of the base parameters, in their units and in the order of `base`. They are nominal values
-    /// only if nothing was identified: a value that the file or a fit provides ([`Model::with_fit`]) replaces the one
-    /// computed from the nominal values of the file, see [`Model::is_identified`].
+    /// The values of the base parameters that the model uses, in their units and in the order of `base`. Each is the
+    /// identified value if the file or a fit has one ([`Model::with_fit`], [`Model::is_identified`]); otherwise it is
+    /// computed from the nominal values of the file.
     pub nominal: Vec<f64>,
     /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
     pub notes: Vec<RecordingNote>,
@@ -418,7 +418,8 @@ impl Model {
         }
     }
 
-    /// Names of the active coordinates, in the order of the file.
+    /// Names of the active coordinates, in the order of the file: those that neither loops nor couplings determine.
+    /// They are the independent coordinates of the mechanism; both words mean the same.
     pub fn active_coordinates(&self) -> Vec<String> {
         self.coordinates(false)
     }
@@ -449,8 +450,9 @@ impl Model {
             .collect()
     }
 
-    /// Names of the regressor rows, in their order. A row belongs to a drive, or to a degree of freedom without an
-    /// actuator, see [`Model::undriven_rows`].
+    /// Names of the regressor rows, in their order. Each row is a drive, or a degree of freedom without an actuator
+    /// ([`Model::undriven_rows`]). With more drives than degrees of freedom, each row is a degree of freedom, and the
+    /// drives are in [`ModelSummary::drives`](crate::model::ModelSummary::drives).
     pub fn drives(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         drives.map(|d| d.name.clone()).collect()

@@ -84,14 +84,14 @@ pub struct ModelSummary {
     pub bodies: usize,
     /// Number of lumped masses.
     pub lumped_masses: usize,
-    /// Names of the active coordinates.
+    /// Names of the active (independent) coordinates.
     pub active: Vec<String>,
     /// Names of the passive coordinates (determined by loop closure).
     pub passive: Vec<String>,
     /// Names of the loops.
     pub loops: Vec<String>,
-    /// Names of all drives. A mechanism with more drives than degrees of freedom, such as a cable robot, has drives
-    /// without rows of their own in the regressor. These are included.
+    /// Names of the drives of the model file. [`Model::drives`] has the rows of the regressor instead. The two differ
+    /// if a degree of freedom has no drive, or if there are more drives than degrees of freedom, as in a cable robot.
     pub drives: Vec<String>,
     /// Names of the regressor rows without an actuator.
     pub undriven: Vec<String>,

@@ -274,9 +274,7 @@ impl DiagnosisFindings {
             }
         }
         lines.push(String::new());
-        lines.push(
-            style.bold("Remaining error (rms) of each drive, and disturbances subtracted before, % of its force"),
-        );
+        lines.push(style.bold("Residual and subtracted disturbances of each drive (rms), relative to its rms force"));
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))

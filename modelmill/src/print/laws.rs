@@ -111,7 +111,7 @@ pub(crate) fn gain(law: &ProposedLaw) -> String {
     );
     // A law may replace several effects that approximate it.
     if !law.instead_of.is_empty() {
-        says.push_str(", and makes these effects unnecessary: ");
+        says.push_str(", and makes these candidates unnecessary: ");
         says.push_str(&words::effects(&law.instead_of));
     }
     says.push('.');

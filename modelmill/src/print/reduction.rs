@@ -20,7 +20,7 @@ impl RigReduction {
         })
     }
 
-    /// The same as text: the report of the reduction, and the error of each drive's force.
+    /// The report of the reduction and the error of each drive's force, as text for a terminal.
     pub fn text(&self) -> String {
         self.reduction.report.text() + &self.errors_text()
     }
@@ -45,7 +45,8 @@ impl ProposedReduction {
         object
     }
 
-    /// The same as text.
+    /// The proposed reduction plan, the error of each drive's force and the number of base parameters, as text for a
+    /// terminal.
     pub fn text(&self) -> String {
         let mut text = "Proposed plan\n".to_owned();
         for says in &self.proposes {

@@ -32,7 +32,7 @@ impl RigCheck {
         })
     }
 
-    /// The same as text.
+    /// The contents as text for a terminal.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{}: {}\n",

@@ -48,7 +48,8 @@ impl ModelCheck {
         object
     }
 
-    /// The same for people, without the next step.
+    /// Validity, contents and magnitudes of the model as text for a terminal. Unlike the JSON, it contains no warnings
+    /// and no next step.
     pub fn text(&self, style: TerminalStyle) -> String {
         let model = &self.model;
         let headline = style.bold(&format!("{}: {}", plain(&model.name), plain(&self.validity())));
@@ -233,7 +234,7 @@ impl ModelSummary {
                 "redundant drives",
                 format!(
                     "{} drives for {}: the force of each drive is not unique. The equations, regressors and base \
-                     parameters are those of their joint force J' f along the independent coordinates: {}",
+                     parameters are those of their generalised force J' f along the independent coordinates: {}",
                     m.shared_drives.len(),
                     count(m.drives.len(), "degree of freedom", "degrees of freedom"),
                     rows.join(", ")

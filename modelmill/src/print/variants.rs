@@ -313,7 +313,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
                 if term.term == term.retained {
                     String::new()
                 } else {
-                    format!("in {}", term.retained)
+                    format!("in p_min of {}", term.retained)
                 },
                 value(term),
                 column_share_text(term),
@@ -377,7 +377,7 @@ fn value(term: &TermShare) -> String {
             format!("{}{unit}", number(after))
         }
         (Some(before), Some(after)) => format!("{} -> {}{unit}", number(before), number(after)),
-        (Some(before), None) => format!("{}{unit}, then removed", number(before)),
-        (None, after) => format!("new, {}{unit}", number(after.unwrap_or(0.0))),
+        (Some(before), None) => format!("removed: {}{unit}", number(before)),
+        (None, after) => format!("added: {}{unit}", number(after.unwrap_or(0.0))),
     }
 }

@@ -160,7 +160,7 @@ impl SmootherTrials {
 fn cost_text(difference: f64) -> String {
     let more = difference.exp() - 1.0;
     if more.abs() < SAME_RESIDUAL_TOLERANCE {
-        "as much".to_owned()
+        "the same".to_owned()
     } else if more < 0.0 {
         format!("{} less", percent(Some(-more)))
     } else {
@@ -274,8 +274,7 @@ impl<'a> SmootherSearch<'a> {
             (one.index, reading)
         });
         // The note states how the residual changes with the alternatives.
-        let mut others = vec![String::new()];
-        others.extend(tried.neighbours().chain(other));
+        let others: Vec<String> = tried.neighbours().chain(other).collect();
         let says = self.choice_text(smoother, decimate, left, &others.join(", "));
         Some(PreparationChoice {
             readings: readings.collect(),
@@ -296,6 +295,11 @@ impl<'a> SmootherSearch<'a> {
         } else {
             String::new()
         };
+        let others = if others.is_empty() {
+            String::new()
+        } else {
+            format!(" Compared with this, the error is {others}.")
+        };
         let all = self.recordings.iter().chain(&self.followers);
         let files: Vec<&str> = all.map(|one| one.raw.file()).collect();
         let what = match files.as_slice() {
@@ -303,8 +307,9 @@ impl<'a> SmootherSearch<'a> {
             all => format!("{} {}", all.join(", "), smoother.describe(true)),
         };
         message!(
-            "{what}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
-             (below {} Hz, geometric mean over the drives){others}. Set it yourself with {}, {} and {}.",
+            "{what}{every}. This was chosen automatically by cross-validation: it smooths most among those whose error on held-out \
+             parts of the run is close to the smallest. Its error there is {} of the force (below {} Hz, geometric mean over the \
+             drives).{others} Set it yourself with {}, {} and {}.",
             percent(Some(left.relative)),
             significant(self.open.band_hz, 3),
             Remedy::option(OptionName::CutoffHz),

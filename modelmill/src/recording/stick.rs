@@ -25,7 +25,7 @@ use super::thresholds::{
 use crate::model::Model;
 use crate::segment::RecordingSegment;
 use crate::segment::picked_states::{PickedStates, rate_sign};
-use crate::text::table::{number, percent, significant};
+use crate::text::table::{percent, significant};
 
 /// Largest number of samples of all runs that are evaluated for the fit.
 const LOOKED_AT: usize = 4000;
@@ -213,10 +213,11 @@ impl StickPhases {
                 let friction = bound.friction.map_or_else(String::new, |friction| {
                     format!(", dry friction {} {}", significant(friction, 3), model.force_unit(d))
                 });
+                let unit = if model.force_unit(d) == "N" { "m/s" } else { "rad/s" };
                 Some(format!(
-                    "`{drive}` {} (rate below {}{friction})",
+                    "`{drive}` {} (velocity below {} {unit}{friction})",
                     percent(Some(*out as f64 / samples as f64)),
-                    number(bound.rate)
+                    significant(bound.rate, 3)
                 ))
             })
             .collect();
@@ -226,7 +227,7 @@ impl StickPhases {
         let says = message!(
             "In {} these drives stick or reverse for a part of the time: {}. Dry friction takes any value up to its \
              size there, so these forces are left out of fits and error figures. {} sets the bound, as a fraction of the \
-             largest rate; 0 keeps all.",
+             largest velocity; 0 keeps all.",
             first.run.file,
             each.join(", "),
             Remedy::option(OptionName::Standstill)

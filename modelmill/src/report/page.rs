@@ -98,6 +98,9 @@ fn summary(findings: &DiagnosisFindings) -> String {
     let (class, word) = match diagnosis.verdict {
         DiagnosisVerdict::Adequate => ("adequate", "model is adequate"),
         DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
+        DiagnosisVerdict::Unexplained if words::has_only_changes_in_time(diagnosis) => {
+            ("unexplained", "a change during a recording explains the error")
+        }
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
     // The same sentences as in the text output.
@@ -131,13 +134,15 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
-         <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
-         tested {}. <i>t value of the decrease</i>: the mean decrease of the squared error over blocks of time, divided by its \
-         standard error. <i>effective samples</i>: the number of independent samples equivalent to these correlated samples. \
-         <i>noise of the force</i>: an upper bound of the force noise, computed from differences of successive samples; the true \
-         noise may be zero. The standard deviations of the missing effects are computed with this noise, or with the residual if \
-         that is larger. The noise or rounding in the picture and in the summary is an rms value over all recordings together, \
-         so the error on one of them may be larger.</p>\n{}",
+         <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. \
+         The noise or rounding in the picture and in the summary is the rms value over all recordings; a single one can have \
+         more.</p>\n<ul>\n\
+         <li><i>decrease of the squared error</i>: relative to the step before, {}, on the drives on which the added effects \
+         act.</li>\n\
+         <li><i>t value of the decrease</i>: its mean over blocks of time, divided by its standard error.</li>\n\
+         <li><i>effective samples</i>: the number of independent samples equivalent to these correlated samples.</li>\n\
+         <li><i>upper bound of the noise</i>: from differences of successive samples. Standard deviations of the missing effects \
+         assume this noise, or the residual if that is larger.</li>\n</ul>\n{}",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),
@@ -212,6 +217,10 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
         let says = match findings.diagnosis.verdict {
             DiagnosisVerdict::Adequate => {
                 "Nothing needs to be added. The parameters below are fitted to the recordings."
+            }
+            _ if words::has_only_changes_in_time(&findings.diagnosis) => {
+                "No effect needs to be added: changes during the recordings explain the error. The verdict at the top of this \
+                 page names them with their times. Split the recordings at these times, and identify the parts separately."
             }
             _ => {
                 "No effect of the library explains the error reliably. Look below where the error is largest. You can define a \
@@ -358,7 +367,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
                 "<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive \
                  are divided by the standard deviation of its residual. The standard deviations of the parameters are computed \
                  from the residual alone, and allow for its correlation in time. Those of the missing effects are computed from \
-                 the residual or from the noise of the force, whichever is larger. So one quantity may have two standard \
+                 the residual or from the upper bound of the noise, whichever is larger. So one quantity may have two standard \
                  deviations.</p>\n",
             );
             html.push_str(&tables::parameters(after));

@@ -9,7 +9,7 @@ use modelmill_identify::{ErrorRegion, TIME_COLUMN, float_to_count};
 use super::draw::{PlotAxis, SvgPicture, range, with_room};
 use super::maps::MapVariable;
 use super::units::{force_unit, variable_unit};
-use crate::compare::region_range;
+use crate::compare::{region_range, variable_phrase};
 use crate::diagnose::ModelVersion;
 use crate::model::Model;
 use crate::text::svg::escape;
@@ -49,9 +49,9 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     // Units make the sentence readable without the picture.
     let name = if region.variable == TIME_COLUMN {
-        "time"
+        "time".to_owned()
     } else {
-        &region.variable
+        variable_phrase(model, &region.variable)
     };
     let interval = format!("{name} {}", region_range(region, &unit));
     // Times of several recordings overlap, so a region in time names its file.
@@ -122,9 +122,9 @@ fn picture(
     picture.rect("region", [low, y.start], [high.max(low + 1.0), y.end]);
     let unit = variable_unit(model, &region.variable);
     let name = if region.variable == TIME_COLUMN {
-        "time"
+        "time".to_owned()
     } else {
-        &region.variable
+        variable_phrase(model, &region.variable)
     };
     let title = format!("{name}, {unit} (error in {})", force_unit(model, d));
     picture.frame(&x, &y, &title, [5, 4]);

@@ -99,7 +99,7 @@ pub(crate) fn steps(findings: &DiagnosisFindings) -> String {
             "step",
             "#error, fit",
             &check,
-            "#squared error explained",
+            "#decrease of the squared error",
             "#t value of the decrease",
             "#effective samples",
         ],
@@ -145,7 +145,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     if findings.after.version().is_some() {
         head.push("#error with the effects");
     }
-    head.push("#noise of the force");
+    head.push("#upper bound of the noise");
     table("", &head, &rows)
 }
 

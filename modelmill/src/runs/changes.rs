@@ -90,7 +90,8 @@ pub enum PhysicalChange {
     EncoderZero {
         /// The coordinate.
         coordinate: String,
-        /// True position minus recorded position, rad or m.
+        /// True position minus recorded position, rad or m; `diagnose` reports the opposite sign, which is the error of
+        /// the recording.
         shift: ChangeEstimate,
     },
 }

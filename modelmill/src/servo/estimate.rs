@@ -107,7 +107,7 @@ pub struct ServoIdentification {
     pub fit: Vec<ServoRowError>,
     /// Errors of the drives on validation runs; empty without any.
     pub check: Vec<ServoRowError>,
-    /// What can be known.
+    /// Groups of base parameters of which the signals determine only ratios; empty if all values can be identified.
     pub scale: ServoScale,
     /// Notes on the result.
     pub notes: Vec<RecordingNote>,

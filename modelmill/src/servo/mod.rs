@@ -34,7 +34,8 @@ pub use scale::{ScaleFreedom, ServoScale};
 pub struct ServoModel {
     /// The model whose equations contain the forces of the actuators. Its base parameters contain the gains.
     pub equations: Model,
-    /// What can be known without a measured force.
+    /// Groups of base parameters of which only ratios can be identified without a measured force; empty if all values
+    /// can be identified.
     pub scale: ServoScale,
 }
 
@@ -44,7 +45,8 @@ impl Model {
         &self.loaded.mechanism.actuators
     }
 
-    /// The model with the forces of its actuators in its equations, and what can be known from its signals.
+    /// The model with the forces of its actuators in its equations, and the base parameters of which its signals
+    /// determine only ratios.
     ///
     /// Fails when the model has no actuators, when an effect depends on the load of a drive, or when the equations
     /// cannot be derived.

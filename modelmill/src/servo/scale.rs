@@ -15,10 +15,10 @@ use super::thresholds::{NULL_ENTRY, NULL_SHARE, SCALE_ROWS_PER_COLUMN};
 use crate::error::{Error, Outcome};
 use crate::model::{Model, reachable_states};
 
-/// What the signals of a model with actuators leave open.
+/// The base parameters that the signals of a model with actuators do not determine completely.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServoScale {
-    /// Groups of base parameters of which only ratios can be known; empty if everything can be known.
+    /// Groups of base parameters of which only ratios can be identified; empty if all values can be identified.
     pub freedoms: Vec<ScaleFreedom>,
 }
 

@@ -138,8 +138,9 @@ fn headline(page: &mut String, all: &[Figures]) {
             panda.faster("blocks", "one state", function),
         ) {
             lines.push(format!(
-                "{what} in blocks takes {a:.1} times less time per state than in scalar instructions, {b:.1} times in \
-                 vectors of 256 bits; {one:.1} times less than one state at a time, whose sines and cosines come in pairs"
+                "{what} of many states in blocks is {a:.1} times faster per state than in scalar instructions, and \
+                 {b:.1} times with vectors of 256 bits. It is {one:.1} times faster than the function for one state, which \
+                 computes sine and cosine of an angle together"
             ));
         }
     }
@@ -255,7 +256,7 @@ fn generation(page: &mut String, all: &[Figures], peers: &Peers) {
 fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
     page.push_str(
         "## Run time\n\n\
-         Nanoseconds per state: one state at a time, whose sines and cosines come in pairs; many states in scalar instructions, one number at a time; in blocks of the widest vectors of this machine and of 256 bits. How many times faster than in scalar instructions blocks are; and how many times longer than one state in Rust our C99 (`cc -O3`) and peers take.\n\n\
+         Nanoseconds per state: one state at a time, with sine and cosine of an angle computed together; many states in scalar instructions, one number at a time; in blocks of the widest vectors of this machine and of 256 bits. How many times faster than in scalar instructions blocks are; and how many times longer than one state in Rust our C99 (`cc -O3`) and peers take.\n\n\
          Inverse dynamics:\n\n",
     );
     let rows = |function: &'static str, who: Vec<&'static str>| {

@@ -75,10 +75,11 @@ impl TourText {
         let reduction = &model.derivation.reduction;
         self.paragraph(&format!(
             "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
-             model file has {}, {} and {}. The screws are the drives spindle_left and spindle_right. The angles of the cranks are \
-             theta1 and theta2; those of the couplers, relative to the cranks, are gamma1 and gamma2. The forces of the screws are \
-             linear in {} of masses, lengths and inertias. Many of these products always act together. Measurements can determine \
-             only {} combinations of them, the base parameters. modelmill finds these symbolically, in exact arithmetic:",
+             model file has {} (two cranks and two couplers), {} and {}. The elbows and the platform are point masses. The screws \
+             are the drives spindle_left and spindle_right. The angles of the cranks are theta1 and theta2; those of the couplers, \
+             relative to the cranks, are gamma1 and gamma2. The forces of the screws are linear in {} of masses, lengths and \
+             inertias. Many of these products always act together. Measurements can determine only {} combinations of them, the \
+             base parameters. modelmill finds these symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
@@ -87,6 +88,12 @@ impl TourText {
         ));
         self.lines(&tables::expressions(2, model));
         self.line("");
+        self.paragraph(
+            "Both sides have the same parameters. A crank has mass m1, length d1, centre of mass at distance dc1 from its base \
+             joint, and moment of inertia Ic12 about this centre. A coupler has m3, d3, dc3 (from its elbow) and Ic32. Point masses: \
+             m2 at each elbow (points R2m and R4m), and half of the platform's mass m4 at the end of each coupler (points R3m and \
+             R3m_right).",
+        );
         self.command(&format!("equations {name}"));
     }
 
@@ -141,7 +148,8 @@ impl TourText {
              in the library: wrong lengths, and faults of signals, such as a drift, a wrong gain or a wrong zero of an encoder. \
              These are {} in all. modelmill fits sets of candidates, together with the base parameters, to one recording. It \
              accepts an effect only if the error also falls on a second recording that is not fitted (the validation run). \
-             Estimating the base parameters alone reduces the error of step 2 from {} to {}.",
+             Step 2 showed the validation run, with an error of {} for nominal parameters. With base parameters estimated from \
+             the other recording, and no effect added, this error is {}.",
             count(all.len(), "candidate", "candidates"),
             percent(seen.compared.figures.nrms),
             percent(findings.diagnosis.steps.first().map(|step| step.check))
@@ -168,7 +176,9 @@ impl TourText {
             ("explained alone", ColumnAlignment::Right),
             ("result", ColumnAlignment::Left),
         ];
-        self.line("Share of the squared error that each candidate explains if it is added alone:");
+        self.line(
+            "Share of the squared error that each candidate explains if added alone, and the result of the search:",
+        );
         self.lines(&table(2, &columns, &rows));
         self.line("");
         // Each effect is described in the words of its kind, with the effects that explain the data equally well.
@@ -277,8 +287,8 @@ impl TourText {
         }
         self.line("");
         self.paragraph(&format!(
-            "Error relative to the force (nrms) on the validation run; the last line, {}, is of all recordings together. The \
-             lengths of the bars are on a logarithmic scale.",
+            "Error relative to the force (nrms) on the validation run. The last line ({}) is the rms value over all recordings; a \
+             single recording can have more. The lengths of the bars are on a logarithmic scale.",
             words::floor_label(noise)
         ));
     }
@@ -290,10 +300,10 @@ impl TourText {
             "The paper that describes this robot reports an error of its model. It names two causes: the positions of the point \
              masses that replace the coupling elements and the platform, and the contact points of the screws on the cranks. \
              modelmill finds a third cause, in the equations of the paper: they give half of the platform's mass m4 to each \
-             coupler. In the balance of forces this half is at the joint between the couplers. In the balance of moments it is at \
-             the coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines all three causes. \
-             The recording is a simulation of the same robot without rods. The base parameters are fixed at their nominal values \
-             (`--held`), as in step 2:",
+             coupler. In the balance of forces this half is at the end of the coupler (R3m or R3m_right). In the balance of moments \
+             it is at the coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines all \
+             three causes. The recording is a simulation of the same robot without rods. The base parameters are fixed at their \
+             nominal values (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
