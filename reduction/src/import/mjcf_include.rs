@@ -2,13 +2,15 @@
 //! comes out.
 //!
 //! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names
-//! relative to the folder of the main file.
+//! relative to the folder of the main file. MuJoCo 4 reads a file that is not there relative to the folder of the
+//! including file.
 
 use modelmill_boundary::nesting::NestingLevel;
 use roxmltree::Document;
 
 use super::xml::{located_message, required_attribute};
 use super::xml_budget::check_xml_budget;
+use super::xml_repair::readable_xml;
 
 /// Largest depth of nested includes.
 const DEEPEST: usize = 20;
@@ -18,12 +20,14 @@ const DEEPEST: usize = 20;
 ///
 /// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
 pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
-    expand_file(text, read, &mut Vec::new(), NestingLevel::top(DEEPEST))
+    expand_file(text, "", read, &mut Vec::new(), NestingLevel::top(DEEPEST))
 }
 
-/// Expands one file. `seen` are the names of the files included so far, `level` is that of nesting.
+/// Expands one file. `folder` is its folder relative to that of the main file, and ends with a slash or is empty. `seen`
+/// are the names of the files included so far, `level` is that of nesting.
 fn expand_file(
     text: &str,
+    folder: &str,
     read: &dyn Fn(&str) -> Result<String, String>,
     seen: &mut Vec<String>,
     level: NestingLevel,
@@ -32,6 +36,8 @@ fn expand_file(
     if check_xml_budget(text).is_err() {
         return Ok(text.to_owned());
     }
+    let readable = readable_xml(text);
+    let text = readable.as_ref();
     let Ok(document) = Document::parse(text) else {
         return Ok(text.to_owned());
     };
@@ -47,7 +53,14 @@ fn expand_file(
             continue;
         }
         let name = required_attribute(&node, "file")?;
-        if seen.contains(&name) {
+        let (mut place, mut other) = (name.clone(), read(&name));
+        if other.is_err() && !folder.is_empty() {
+            let beside = format!("{folder}{name}");
+            if let Ok(text) = read(&beside) {
+                (place, other) = (beside, Ok(text));
+            }
+        }
+        if seen.contains(&place) {
             return Err(located_message(
                 &node,
                 &format!("`{name}` is included twice; MuJoCo permits each file once"),
@@ -56,10 +69,11 @@ fn expand_file(
         let inside = level
             .enter()
             .map_err(|fault| located_message(&node, &format!("`{name}` cannot be included; {fault}")))?;
-        // Read the other file and expand its own includes.
-        seen.push(name.clone());
-        let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
-        let whole = expand_file(&other, read, seen, inside)
+        let other = other.map_err(|fault| located_message(&node, &fault))?;
+        // The other file's own includes are expanded.
+        let folder_of_other = place[..place.rfind('/').map_or(0, |slash| slash + 1)].to_owned();
+        seen.push(place);
+        let whole = expand_file(&other, &folder_of_other, read, seen, inside)
             .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         check_xml_budget(&whole).map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         let inner = Document::parse(&whole)

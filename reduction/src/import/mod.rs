@@ -33,6 +33,7 @@ mod urdf_extensions;
 mod welds;
 mod xml;
 mod xml_budget;
+mod xml_repair;
 
 pub use mjcf_include::expand_includes;
 pub use mjcf_meshes::MeshFiles;
@@ -170,6 +171,8 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
             "{fault}; no robot description needs that, so check that this is the intended file"
         ))
     })?;
+    let readable = xml_repair::readable_xml(text);
+    let text = readable.as_ref();
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {

@@ -182,7 +182,9 @@ fn included_files_stand_in_their_place() {
         "more/defaults.xml" => {
             Ok("<mujocoinclude>\n<default>\n<joint axis=\"1 0 0\"/></default></mujocoinclude>".to_owned())
         }
-        "bar.xml" => Ok(format!("<mujoco>\n{}\n</mujoco>", bar("bar", "0 0 0", ""))),
+        // The name of the next file is relative to this one's folder, as MuJoCo 4 reads it if no other file has the name.
+        "deep/bar.xml" => Ok("<mujoco><!-- a -- b --><include file=\"parts/inner.xml\"/></mujoco>".to_owned()),
+        "bar.xml" | "deep/parts/inner.xml" => Ok(format!("<mujoco>\n{}\n</mujoco>", bar("bar", "0 0 0", ""))),
         other => Err(format!("{other} is not there")),
     };
     let whole = modelmill_reduction::expand_includes(main, &read).unwrap();
@@ -192,6 +194,8 @@ fn included_files_stand_in_their_place() {
     let sound = whole.replace("<joint type=\"screw\"/>", "");
     let model = import(&sound, &ImportOptions::default()).unwrap().model;
     assert!(model.contains("name = \"bar\""), "{model}");
+    let deep = main.replace("bar.xml", "deep/bar.xml");
+    assert_eq!(modelmill_reduction::expand_includes(&deep, &read).unwrap(), whole);
     let lost = main.replace("bar.xml", "bare.xml");
     let fault = modelmill_reduction::expand_includes(&lost, &read).unwrap_err();
     assert!(
