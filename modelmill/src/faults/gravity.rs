@@ -8,7 +8,7 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::Remedy;
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::ScaledNormalEquations;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::bench::{FaultBench, HypothesisErrors, RIDGE};
 use super::correction::{FaultCorrection, ForceChange, MotionChange};
@@ -123,8 +123,13 @@ fn direction_text(direction: Vector3<f64>) -> String {
 
 /// Forces of gravity along each axis of the base, and the measured forces without the rest of the model.
 struct GravityRows {
-    /// Columns by drive: forces for 1 m/s^2 along x, y and z, then friction and offset.
+    /// Columns by drive: forces for 1 m/s^2 along each of `axes`, then friction and offset. Columns of axes along which
+    /// gravity has no effect are zero.
     columns: Vec<DMatrix<f64>>,
+    /// Three orthogonal axes in the base frame, one per column: those along which gravity has no effect are among them.
+    axes: Matrix3<f64>,
+    /// Gravity in the model file along each of these axes, m/s^2.
+    given: Vector3<f64>,
     /// Measured forces minus those of motion with nominal values, by drive.
     measured: Vec<DVector<f64>>,
 }
@@ -180,10 +185,17 @@ impl GravityRows {
             columns.push(of_drive);
             measured.push(left);
         }
-        Some(Self { columns, measured })
+        let axes = independent_axes(&mut columns);
+        Some(Self {
+            columns,
+            axes,
+            given: axes.tr_mul(&given),
+            measured,
+        })
     }
 
-    /// The vector of gravity, m/s^2; `None` if a component is uncertain relative to `size`.
+    /// The vector of gravity in the base frame, m/s^2; `None` if a component is uncertain relative to `size`. A component
+    /// without effect, such as that normal to the plane of a planar arm, is that of the model file.
     fn solve(&self, size: f64) -> Option<Vector3<f64>> {
         let n = self.columns.len();
         let width = 3 + FRICTION * n;
@@ -220,8 +232,41 @@ impl GravityRows {
             let variance = solver.solve(&unit)[k];
             (CORRELATED * variance.max(0.0)).sqrt() < GRAVITY_MOST_UNCERTAINTY * size
         });
-        is_certain.then(|| Vector3::new(values[0], values[1], values[2]))
+        let has_effect = |k: usize| self.columns.iter().any(|of| of.column(k).amax() > 0.0);
+        let along = Vector3::from_fn(|k, _| if has_effect(k) { values[k] } else { self.given[k] });
+        is_certain.then(|| self.axes * along)
     }
+}
+
+/// Replaces the first three columns of each drive, which belong to the axes of the base, by those of orthogonal axes that
+/// have independent effects, and returns these axes. Columns that only rounding fills become zero.
+fn independent_axes(columns: &mut [DMatrix<f64>]) -> Matrix3<f64> {
+    /// Squared size of a column relative to the largest, up to which it is rounding.
+    const ROUNDING: f64 = 1e-20;
+    let gram = |of: &DMatrix<f64>| {
+        of.columns(0, 3)
+            .tr_mul(&of.columns(0, 3))
+            .fixed_view::<3, 3>(0, 0)
+            .into_owned()
+    };
+    let axes = columns
+        .iter()
+        .map(gram)
+        .sum::<Matrix3<f64>>()
+        .symmetric_eigen()
+        .eigenvectors;
+    let mut squares = Vector3::zeros();
+    for of in &mut *columns {
+        let turned = of.columns(0, 3) * axes;
+        squares += Vector3::from_fn(|k, _| turned.column(k).norm_squared());
+        of.columns_mut(0, 3).copy_from(&turned);
+    }
+    for k in (0..3).filter(|k| squares[*k] <= ROUNDING * squares.max()) {
+        for of in &mut *columns {
+            of.column_mut(k).fill(0.0);
+        }
+    }
+    axes
 }
 
 /// The inverse of the mean square; 0 for a force of zero.

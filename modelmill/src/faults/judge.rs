@@ -85,7 +85,8 @@ impl JudgedHypothesis {
     }
 }
 
-/// The fault of a recording that explains it best; `None` if none is decisive.
+/// The suspected fault whose correction brings recording and model into the best agreement; `None` if no fault is
+/// decisive.
 pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
     let bench = FaultBench::new(subject.model, subject.segments)?;
     let rows = bench.rows(&MotionChange::None);

@@ -36,6 +36,20 @@ fn gravity_that_pulls_the_other_way_is_told() {
     }
 }
 
+/// A planar arm feels no gravity across its plane; within the plane its direction is still found.
+#[test]
+fn gravity_along_another_axis_of_a_plane_is_told() {
+    let text = std::fs::read_to_string(bundled("two_link")).expect("a model");
+    let turned = text.replace("[0, \"-g\", 0]", "[\"g\", 0, 0]");
+    assert_ne!(text, turned);
+    let [given, machine] = [text, turned].map(|text| Model::from_text("two_link", &text).expect("a model"));
+    for seed in 0..3 {
+        let says = told(&machine, &given, "two_link", seed);
+        let is_stated = |says: &String| says.contains("gravity points along x of the base");
+        assert!(says.iter().any(is_stated), "{seed}: {says:?}");
+    }
+}
+
 /// One model has one gravity: recordings that show another direction are named, and where others contradict them nothing is
 /// claimed.
 #[test]
