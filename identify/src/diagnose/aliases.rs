@@ -3,10 +3,10 @@
 
 use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
 use super::conditional::ConditioningSet;
-use super::problem::{CandidateEffect, ColumnSource, LocatedEffect, ReadingFaultKind};
+use super::problem::{CandidateEffect, ColumnSource, LocatedEffect, ReadingFaultKind, TIME_BASE};
 use super::thresholds::{
-    MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SIGNAL_FAULT_LEAST_DIFFERENCE,
-    SIGNAL_FAULT_MOST_PLACE, SUBSTITUTE_MOST_RATIO,
+    CLOCK_OR_LENGTH_MOST_RATIO, MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE,
+    SIGNAL_FAULT_LEAST_DIFFERENCE, SIGNAL_FAULT_MOST_PLACE, SUBSTITUTE_MOST_RATIO,
 };
 
 /// An effect that cannot be distinguished from one that was found.
@@ -85,12 +85,11 @@ impl EffectSelector<'_> {
                 set.push(candidate.clone());
                 let tried = self.fit_from_gram(&table, set);
                 let trial = self.refit_at_size(candidate, tried, squares);
-                // Neither of two signal faults is shown if the forces lie between both.
-                let most_loss = if self.are_between(&pick, candidate, &rest, &trial) {
-                    f64::INFINITY
-                } else {
-                    MIN_DISTINCTION
-                };
+                // Neither of two signal faults is shown if the forces lie between both, and neither a clock nor a length
+                // if both fit.
+                let are_alike = self.are_clock_and_length(&pick, candidate, trial.squares / squares)
+                    || self.are_between(&pick, candidate, &rest, &trial);
+                let most_loss = if are_alike { f64::INFINITY } else { MIN_DISTINCTION };
                 if let Some(worse) = substitute(self, &others, &trial, most_loss) {
                     found.push(EffectAlias {
                         effect: self.candidate(candidate).effect.clone(),
@@ -184,6 +183,15 @@ impl EffectSelector<'_> {
             }
         }
         squares < SIGNAL_FAULT_LEAST_DIFFERENCE * total || product.abs() > SIGNAL_FAULT_MOST_PLACE * squares
+    }
+
+    /// Whether one of two candidates is a clock that runs fast or slow, the other a constant of the geometry, and the squared
+    /// residual with the one is hardly larger than that with the other.
+    fn are_clock_and_length(&self, one: &SelectedEffect, other: &SelectedEffect, residual_ratio: f64) -> bool {
+        let is_clock = |pick: &SelectedEffect| self.candidate(pick).effect.kind == TIME_BASE;
+        let is_constant = |pick: &SelectedEffect| matches!(self.candidate(pick).source, ColumnSource::Constant(_));
+        let are_both = (is_clock(one) && is_constant(other)) || (is_constant(one) && is_clock(other));
+        are_both && residual_ratio <= CLOCK_OR_LENGTH_MOST_RATIO
     }
 
     /// Whether one of two effects at the same places is the general form of the other.

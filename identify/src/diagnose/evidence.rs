@@ -225,7 +225,7 @@ impl EffectSelector<'_> {
     }
 
     /// Squares of a residual relative to the white noise, mean over some channels.
-    fn squares_over_noise(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
+    pub(super) fn squares_over_noise(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
         let of = |d: &usize| {
             let noise = self.problem.noise[*d].powi(2).max(f64::MIN_POSITIVE);
             self.pool.mean_square(*d, &rest[*d]) / noise

@@ -84,7 +84,7 @@ pub use noise::{effective_samples, white_noise};
 pub use problem::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter,
     ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider, ReadingFaultKind, SampleLayout,
-    SampleSegment, SignConstraint,
+    SampleSegment, SignConstraint, TIME_BASE,
 };
 pub use rejection::RejectionReason;
 pub use support::EffectSupport;
@@ -96,7 +96,7 @@ use bench::{EffectSelector, SelectedEffect};
 use in_time::FoundChange;
 use pool::FitScope;
 use reproducible::repeatable_shares;
-use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
+use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, EXPLICABLE_LEAST_NOISE_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
@@ -618,6 +618,13 @@ impl EffectSelector<'_> {
         let has_check = self.problem.layout.has_check();
         let table = self.projected_gram(picks);
         let now = self.fit_from_gram(&table, picks.to_vec()).squares;
+        // A candidate may fit noise too: where nothing else is left, that is the reason.
+        let (factors, _) = self.fit(picks, FitScope::All);
+        let rest = self.residual(picks, &factors);
+        let is_only_noise = |pick: &SelectedEffect| {
+            let channels = self.affected_channels(std::slice::from_ref(pick));
+            self.squares_over_noise(&rest, &channels) <= EXPLICABLE_LEAST_NOISE_RATIO
+        };
         let mut considered: Vec<CandidateOutcome> = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
             let picked = picks.iter().position(|p| p.candidate == k);
@@ -642,6 +649,8 @@ impl EffectSelector<'_> {
                     RejectionReason::ImplausibleValue
                 } else if gain < LEAST_GAIN {
                     RejectionReason::ExplainsNothing
+                } else if is_only_noise(pick) {
+                    RejectionReason::OnlyNoiseRemains
                 } else {
                     RejectionReason::ExplainedBetter
                 };

@@ -5,7 +5,7 @@
 //! size of the machine, an angle and a time with those of real gears, encoders and amplifiers.
 
 use super::bench::{EffectSelector, SelectedEffect, n_columns};
-use super::problem::{CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, ReadingFaultKind};
+use super::problem::{CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, ReadingFaultKind, TIME_BASE};
 use super::thresholds::{
     GAIN_LEAST, GAIN_MOST, GRID_END_SHARE, PLAUSIBLE_MOST_ANGLE, PLAUSIBLE_MOST_CLOCK_SHARE, PLAUSIBLE_MOST_DELAY,
     PLAUSIBLE_MOST_FORCE_RATIO, PLAUSIBLE_MOST_LENGTH_SHARE, PLAUSIBLE_MOST_LOAD_SHARE, PLAUSIBLE_MOST_PLAY,
@@ -40,7 +40,7 @@ fn largest_value(candidate: &CandidateEffect, parameter: usize, size: f64) -> f6
         "rad" if !matches!(candidate.source, ColumnSource::Tilt(_)) => PLAUSIBLE_MOST_ANGLE,
         "s" => PLAUSIBLE_MOST_DELAY,
         "1" if candidate.source == ColumnSource::LoadDependent => PLAUSIBLE_MOST_LOAD_SHARE,
-        "1" if kind == "time_base" => PLAUSIBLE_MOST_CLOCK_SHARE,
+        "1" if kind == TIME_BASE => PLAUSIBLE_MOST_CLOCK_SHARE,
         _ => f64::INFINITY,
     }
 }

@@ -146,6 +146,9 @@ pub enum ColumnSource {
     LoadDependent,
 }
 
+/// Kind of the candidate for a clock that runs fast or slow in all recordings alike.
+pub const TIME_BASE: &str = "time_base";
+
 /// A fault of a force signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadingFaultKind {

@@ -204,6 +204,10 @@ pub(super) const SIGNAL_FAULT_MOST_PLACE: f64 = 0.25;
 /// noise. A true low-pass of 35 Hz on the spidermill, at some 0.02, was bent to a delay.
 pub(super) const SIGNAL_FAULT_LEAST_DIFFERENCE: f64 = 0.05;
 
+/// A clock and a wrong length are not distinguished if the squared residual with the one is at most this many times that
+/// with the other (1): scaled times are scaled lengths, and what differs is as small as errors of smoothing. By judgement.
+pub(super) const CLOCK_OR_LENGTH_MOST_RATIO: f64 = 1.05;
+
 /// An alternative must explain at least this share of what the effect explains (1). By judgement.
 pub(super) const MIN_SUBSTITUTE_SHARE: f64 = 0.8;
 

@@ -27,7 +27,7 @@ pub(crate) struct DiagnosisAnswer {
     pub(crate) corrected: Vec<CorrectedFaultAnswer>,
     /// Faults of the recordings that could not be corrected; nothing else is stated then.
     pub(crate) unresolved: Vec<CorrectedFaultAnswer>,
-    /// Errors after each added effect; the first step is the model as it is.
+    /// Errors after each step; the first step is the model as it is.
     pub(crate) steps: Vec<SelectionStepAnswer>,
     /// Missing effects.
     pub(crate) effects: Vec<MissingEffectAnswer>,
@@ -94,6 +94,8 @@ pub(crate) struct DisturbanceAnswer {
     pub(crate) interval: Option<[f64; 2]>,
     /// Whether the verdict names it.
     pub(crate) in_verdict: bool,
+    /// What explains as much in its place: errors of the geometry, an elastic drive, a contact; empty if there is nothing.
+    pub(crate) indistinguishable_from: Vec<LocatedEffect>,
 }
 
 /// A fault of recordings with what to do about it.

@@ -4,12 +4,14 @@
 
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
-    SignConstraint,
+    SignConstraint, TIME_BASE,
 };
 
-use crate::faults::RecordingFaultKind;
 use crate::model::Model;
 use crate::regressors::SegmentList;
+
+/// Name of the candidate's parameter: the share by which recorded times are too long.
+pub(crate) const CLOCK_SHARE: &str = "share";
 
 /// The candidate; `None` if a derivative is missing. `slopes` are the derivatives of the forces by position, rate and
 /// acceleration of each coordinate.
@@ -38,11 +40,11 @@ pub(crate) fn clock(
     }
     (!column.is_zero()).then(|| CandidateEffect {
         effect: LocatedEffect {
-            kind: RecordingFaultKind::TimeBase.name().to_owned(),
+            kind: TIME_BASE.to_owned(),
             at: vec!["t".to_owned()],
         },
         parameters: vec![EffectParameter {
-            symbol: "share".to_owned(),
+            symbol: CLOCK_SHARE.to_owned(),
             unit: "1".to_owned(),
             sign: SignConstraint::Any,
         }],

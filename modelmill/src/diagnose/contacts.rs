@@ -102,12 +102,17 @@ pub(super) fn contacts_in_residual(
     (kept.len() < contacts.len()).then_some(kept)
 }
 
-/// The share of a contact's force that a residual has: the largest magnitude of the medians of three neighbours. `rest` is the
-/// residual during the contact, `None` where it is not known, as at standstill. `None` if too little is known.
+/// The share of a contact's force that a residual has: the largest magnitude of the medians of three neighbours, or of its
+/// values if there are fewer than three. `rest` is the residual during the contact, `None` where it is not known, as at
+/// standstill. `None` if too little is known.
 fn share_in_residual(force: f64, rest: &[Option<f64>]) -> Option<f64> {
     let known: Vec<f64> = rest.iter().copied().flatten().collect();
     if (known.len() as f64) < CONTACT_LEAST_KNOWN_SHARE * rest.len() as f64 {
         return None;
+    }
+    if known.len() < 3 {
+        let largest = known.iter().map(|value| value.abs()).max_by(f64::total_cmp)?;
+        return Some(largest / force.abs());
     }
     let medians = known.windows(3).map(|three| {
         let mut three = [three[0], three[1], three[2]];
@@ -476,6 +481,9 @@ mod tests {
         assert!(gone < CONTACT_LEAST_REST_SHARE, "{gone}");
         let standing: Vec<Option<f64>> = push(1.9).enumerate().map(|(k, x)| (k > 12).then_some(x)).collect();
         assert_eq!(share_in_residual(2.0, &standing), None);
+        // Decimation leaves one or two samples of a short contact.
+        assert_eq!(share_in_residual(2.0, &known(vec![0.1, -0.2])), Some(0.1));
+        assert_eq!(share_in_residual(2.0, &[]), None);
     }
 
     /// A contact beside a change of the same recording is doubtful; one of another recording is not.

@@ -194,8 +194,9 @@ impl DiagnosisFindings {
     pub fn verdict_text(&self) -> String {
         let says = if self.unresolved.is_empty() {
             let verdict = words::verdict(&self.diagnosis, self.channels(), self.validation);
-            let more = words::geometry_alternative_text(&self.geometry_alternatives);
-            [Some(verdict), more]
+            let more = words::geometry_alternative_text(&self.geometry_alternatives, !self.missing.is_empty());
+            let elastic = words::elastic_alternative_text(&self.elastic_alternatives);
+            [Some(verdict), more, elastic]
                 .into_iter()
                 .flatten()
                 .collect::<Vec<_>>()
@@ -230,6 +231,7 @@ impl DiagnosisFindings {
             self.undecided.clear();
             self.off_nominal.clear();
             self.geometry_alternatives.clear();
+            self.elastic_alternatives.clear();
             self.regions.clear();
             self.missing.clear();
             self.laws.clear();

@@ -6,6 +6,7 @@ use modelmill_identify::diagnose::Disturbance;
 use crate::text::names::joined_by_and;
 use crate::text::table::{all_digits, number, percent, significant};
 
+use super::thresholds::BRIEF_MOST_S;
 use super::words::kind;
 
 /// Disturbances as sentences; noise and outliers of several drives share one.
@@ -57,12 +58,9 @@ fn share_of_samples(one: &Disturbance) -> String {
     percent(share.map(|share| share.value))
 }
 
-/// A disturbance as a sentence without the last full stop; sizes have units.
-pub fn disturbance(one: &Disturbance) -> String {
-    let at = one.at.join(", ");
-    let value = |name: &str| estimate(one, name);
-    // All estimates with standard deviations, for kinds without a sentence of their own.
-    let all: Vec<String> = (one.estimates.iter())
+/// All estimates with standard deviations and units; `words` writes the name of an estimate.
+fn values_text(one: &Disturbance, words: impl Fn(&str) -> String) -> String {
+    let values: Vec<String> = (one.estimates.iter())
         .map(|q| {
             let deviation = q.standard_deviation;
             let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
@@ -71,11 +69,29 @@ pub fn disturbance(one: &Disturbance) -> String {
                 Some(_) => all_digits(q.value),
                 None => number(q.value),
             };
-            let quantity_text = format!("{} {value}{deviation} {unit}", q.name);
+            let quantity_text = format!("{} {value}{deviation} {unit}", words(&q.name));
             quantity_text.trim_end().to_owned()
         })
         .collect();
-    let all = all.join(", ");
+    values.join(", ")
+}
+
+/// The estimate of an offset drift in words, by its name.
+fn offset_name(name: &str) -> String {
+    if let Some(recording) = name.strip_prefix("change of F0 in ") {
+        format!("change from start to end of {recording}")
+    } else if let Some(recording) = name.strip_prefix("F0 in ") {
+        format!("offset in the middle of {recording}")
+    } else {
+        name.to_owned()
+    }
+}
+
+/// A disturbance as a sentence without the last full stop; sizes have units.
+pub fn disturbance(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    let value = |name: &str| estimate(one, name);
+    let all = values_text(one, str::to_owned);
     match one.kind.as_str() {
         // Each kind says what it is and what follows for the model.
         "coloured_noise" => format!(
@@ -102,7 +118,10 @@ pub fn disturbance(one: &Disturbance) -> String {
                 frequencies.join(" and ")
             )
         }
-        "offset_drift" => format!("the zero of the measured force of {at} drifts with time: {all}"),
+        "offset_drift" => format!(
+            "the zero of the measured force of {at} drifts with time: {}",
+            values_text(one, offset_name)
+        ),
         "friction_drift" => {
             format!("the friction of {at} changes during a recording, as it does when a joint warms up: {all}")
         }
@@ -147,13 +166,21 @@ pub fn disturbance(one: &Disturbance) -> String {
         "gain_change" | "offset_step" | "payload_change" if one.interval.is_some() => {
             let [from, to] = one.interval.unwrap_or_default().map(|t| significant(t, 4));
             let runs = one.recordings.join(", ");
-            format!(
-                "{} at t = {from} s and keeps the new value until {to} s ({runs}): {all}",
-                what_changes(one)
-            )
+            let when = if is_brief_force(one) {
+                format!("from {from} to {to} s")
+            } else {
+                format!("at t = {from} s and keeps the new value until {to} s")
+            };
+            format!("{} {when} ({runs}): {all}", what_changes(one))
         }
         other => format!("{} ({at}): {all}", kind(other)),
     }
+}
+
+/// Whether a disturbance is a force that acts only briefly: an offset that returns so soon may be a contact or a push.
+pub(crate) fn is_brief_force(one: &Disturbance) -> bool {
+    let lasts = one.interval.map(|[from, to]| to - from);
+    one.kind == "offset_step" && lasts.is_some_and(|time| time < BRIEF_MOST_S)
 }
 
 /// What a change within a recording changes, as a clause.
@@ -161,6 +188,9 @@ pub(super) fn what_changes(one: &Disturbance) -> String {
     let at = one.at.join(", ");
     match one.kind.as_str() {
         "gain_change" => format!("the scale of the measured force of {at} changes"),
+        "offset_step" if is_brief_force(one) => {
+            format!("a contact or push acts on {at}, or the zero of its measured force jumps,")
+        }
         "offset_step" => format!("the zero of the measured force of {at} jumps"),
         _ => format!("the load on {at} changes"),
     }

@@ -96,7 +96,17 @@ fn unit_of_constant(answer: &DiagnosisSolution, found: &IdentifiedEffect, name: 
         let mut units = constant.units.iter();
         units.find(|(carries, _)| *carries == spot.carries)
     });
-    units.map_or_else(String::new, |(_, unit)| unit.clone())
+    if let Some((_, unit)) = units {
+        return unit.clone();
+    }
+    // Dahl friction is in no library. Its distance has the unit of the drive's position.
+    if found.effect.kind == "dahl_friction" && name == "length" {
+        let force = answer.problem.candidates[found.candidate].parameters.first();
+        let is_linear = force.is_some_and(|force| force.unit == "N");
+        let unit = if is_linear { "m" } else { "rad" };
+        return unit.to_owned();
+    }
+    String::new()
 }
 
 #[cfg(test)]

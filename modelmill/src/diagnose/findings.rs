@@ -3,7 +3,9 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, OptionName, Remedy};
-use modelmill_identify::diagnose::{DiagnosisVerdict, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis};
+use modelmill_identify::diagnose::{
+    DiagnosisVerdict, Disturbance, EffectSupport, IdentifiedEffect, LocatedEffect, ModelDiagnosis, TIME_BASE,
+};
 use modelmill_identify::{ErrorRegion, RecordingNote};
 use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
@@ -19,10 +21,12 @@ use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 use super::added_effects::{self, CompletedModelFile};
+use super::clock::CLOCK_SHARE;
 use super::completion::ModelCompletion;
 use super::constants::CONSTANT_ERROR;
 use super::corrected::CorrectedRecordings;
 use super::effect_search::search_effects;
+use super::elastic_drives::{ElasticAlternative, elastic_alternatives};
 use super::estimates::{EffectEstimate, effect_estimates};
 use super::faults;
 use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_alternatives};
@@ -102,6 +106,8 @@ pub struct DiagnosisFindings {
     /// Errors of the geometry that explain as much as the effects in [`Self::missing`] together, the best first.
     /// Zeros that the model file writes as coordinates of points are among them.
     pub geometry_alternatives: Vec<GeometryAlternative>,
+    /// Errors of encoders that elastic drives explain as well.
+    pub elastic_alternatives: Vec<ElasticAlternative>,
     /// The regions of large error that text and JSON report: ranges of a coordinate, velocity, load or time. If the
     /// verdict is [`DiagnosisVerdict::Unexplained`], they are regions of the residual of the unexplained drives.
     /// Otherwise they are the regions in [`Self::places`].
@@ -296,6 +302,7 @@ impl Model {
             off_nominal: Vec::new(),
             with_nominal: None,
             geometry_alternatives: Vec::new(),
+            elastic_alternatives: Vec::new(),
             regions: Vec::new(),
             before,
             after,
@@ -333,6 +340,8 @@ impl Model {
         if !findings.share_with_geometry() {
             findings.share_constants(found.in_place_of_constants.as_ref());
         }
+        findings.elastic_alternatives =
+            elastic_alternatives(findings.final_version(), &findings.diagnosis.disturbances);
         if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -481,7 +490,12 @@ fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifferenc
     })
 }
 
-/// Errors of the geometry that explain as much as all effects found together.
+/// Whether a disturbance is a clock that runs fast or slow in all recordings alike, which scaled lengths explain too.
+pub(crate) fn is_common_clock(one: &Disturbance) -> bool {
+    one.kind == TIME_BASE && one.estimates.iter().any(|quantity| quantity.name == CLOCK_SHARE)
+}
+
+/// Errors of the geometry that explain as much as all effects found together, or as a clock if that is all that was found.
 ///
 /// Fails when it is cancelled.
 fn alternatives_to_effects(
@@ -489,7 +503,8 @@ fn alternatives_to_effects(
     named: Option<&NamedZeros>,
     held: FixedParameters,
 ) -> Outcome<Vec<GeometryAlternative>> {
-    if findings.missing.is_empty() {
+    let has_clock = findings.diagnosis.disturbances.iter().any(is_common_clock);
+    if findings.missing.is_empty() && !has_clock {
         return Ok(Vec::new());
     }
     let wrong = findings.missing.iter().filter(|one| one.effect.kind == CONSTANT_ERROR);
@@ -501,7 +516,7 @@ fn alternatives_to_effects(
         Vec::new()
     };
     let remaining = findings.answer.mean_square_residual();
-    let n_effects = findings.missing.len();
+    let n_effects = findings.missing.len().max(1);
     geometry_alternatives(&findings.before, named, held, &constants, n_effects, remaining)
 }
 

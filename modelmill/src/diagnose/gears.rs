@@ -15,9 +15,12 @@ use crate::regressors::SegmentList;
 
 use super::numbers::stack;
 
+/// Kind of the compliance of a drive.
+pub(crate) const COMPLIANCE: &str = "drive_compliance";
+
 /// Kinds with their parameters. The displacement of the load is torque times compliance, or half the play to
 /// either side.
-const KINDS: [(&str, &str); 2] = [("drive_compliance", "compliance"), ("backlash", "play")];
+const KINDS: [(&str, &str); 2] = [(COMPLIANCE, "compliance"), ("backlash", "play")];
 
 /// Compliance and backlash of every drive on a joint. `slopes` are the derivatives of the forces by position,
 /// rate and acceleration of each coordinate; `values` are the base parameters.
@@ -71,7 +74,7 @@ pub(crate) fn gears(
         // Units depend on the kind of the joint.
         let is_angle = model.active_coordinate_types()[i].1;
         for (kind, symbol) in KINDS {
-            let is_yielding = kind == "drive_compliance";
+            let is_yielding = kind == COMPLIANCE;
             // Displacement of the load and its derivatives: order 0, 1 and 2.
             let shift = |order: usize, sample: usize| match (is_yielding, order) {
                 (true, order) => loads[order * n + d][sample],

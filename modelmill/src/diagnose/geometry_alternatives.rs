@@ -475,7 +475,7 @@ impl GeometryError {
     }
 
     /// The same as an effect, for lists of explanations that the recordings do not distinguish.
-    pub(super) fn as_effect(&self) -> LocatedEffect {
+    pub(crate) fn as_effect(&self) -> LocatedEffect {
         LocatedEffect {
             kind: CONSTANT_ERROR.to_owned(),
             at: vec![self.name()],

@@ -21,8 +21,9 @@
 //! 9. `model_versions`: identifies the models without and with the effects, and evaluates them along all recordings.
 //! 10. `off_nominal`: lists base parameters whose estimates differ from the nominal values.
 //! 11. `laws`: lists force laws that are in no library and would explain the residual.
-//! 12. `geometry_alternatives`: lists errors of the geometry that explain as much as the effects found; `named_zeros` makes
-//!     zeros of the model file constants for this.
+//! 12. `geometry_alternatives`: lists errors of the geometry that explain as much as the effects found; for this,
+//!     `named_zeros` replaces coordinates of points that the file writes as 0 by named constants (in memory).
+//!     `elastic_drives` lists drives whose deflection looks like an eccentric encoder.
 //! 13. `findings`: collects the results; `completed` gives the completed model file.
 //!
 //! In addition, `requested_effects` derives and evaluates effects that the user names, `words` writes sentences, and
@@ -39,6 +40,7 @@ mod contacts;
 mod corrected;
 mod disturbance_words;
 mod effect_search;
+mod elastic_drives;
 mod encoders;
 mod estimates;
 mod faults;
@@ -67,7 +69,9 @@ mod zero_or_tilt;
 
 pub(crate) use candidates::sign;
 pub use completion::ModelCompletion;
+pub use elastic_drives::ElasticAlternative;
 pub use estimates::EffectEstimate;
+pub(crate) use findings::is_common_clock;
 pub use findings::{
     DiagnosisFindings, DiagnosisOptions, MissingEffect, NominalDiagnosis, SeparationProposal, UndecidedEffect,
 };

@@ -159,3 +159,10 @@ pub(super) const ZEROS_MOST_PRODUCTS: usize = 100;
 /// Most zeros that are named; with more, too many sets of errors explain the same. By judgement: the legs of a delta
 /// robot have twelve.
 pub(super) const MOST_ZEROS: usize = 12;
+
+/// An eccentric encoder may be an elastic drive if the weight on it explains this share of the variance of the encoder's error
+/// (1). By judgement.
+pub(super) const ELASTIC_LEAST_SHARE: f64 = 0.8;
+
+/// An offset of a force that returns within this time may be a contact or a push (s): both act for as long. By judgement.
+pub(super) const BRIEF_MOST_S: f64 = 1.0;

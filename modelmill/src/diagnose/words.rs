@@ -10,8 +10,10 @@ use crate::faults::{SuspectedFault, is_suspicion};
 use crate::text::names::joined_by_and;
 use crate::text::table::{percent, significant};
 
+pub(crate) use super::disturbance_words::is_brief_force;
 use super::disturbance_words::what_changes;
 pub use super::disturbance_words::{disturbance, disturbance_sentences};
+use super::elastic_drives::ElasticAlternative;
 use super::geometry_alternatives::{GeometryAlternative, GeometryError};
 use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
 
@@ -53,11 +55,23 @@ impl ValidationMethod {
 pub fn kind(name: &str) -> String {
     match name {
         "constant_error" => "wrong length or angle".to_owned(),
-        "lumped_mass_placement" => "moment of a misplaced lumped mass".to_owned(),
+        // Candidates of this kind are searched only if the friction of the model is fixed.
+        "different_runs" => "friction that differs from the fixed values".to_owned(),
+        "lumped_mass_placement" => "correction of the moment of a lumped mass".to_owned(),
         "periodic_in_time" => "sinusoidal disturbance".to_owned(),
         "two_point_element" => "spring or damper between two points".to_owned(),
         "untied_part" => "parameters of its own instead of shared ones".to_owned(),
         _ => name.replace('_', " "),
+    }
+}
+
+/// The kind of a disturbance in words.
+fn disturbance_kind(one: &Disturbance) -> String {
+    // A difference names its recordings; different friction of all recordings does not.
+    if one.kind == "different_runs" && !one.recordings.is_empty() {
+        "difference between recordings".to_owned()
+    } else {
+        kind(&one.kind)
     }
 }
 
@@ -217,11 +231,19 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     if is_rounding(diagnosis.noise_floor) {
         // The figure is of all recordings together, so the error of one of them may be larger.
         format!(
-            "The forces are noise-free: rounding causes an error of {floor} (rms over all recordings; a single one can have \
-             more)."
+            "The forces are noise-free: rounding causes an error of {floor} (rms over all recordings; in one recording it can be \
+             larger)."
         )
     } else {
-        format!("The noise is {floor} of the force.")
+        // Only then a reader asks how an error can be smaller.
+        let last = diagnosis.steps.last();
+        let is_below = last.is_some_and(|last| last.check < diagnosis.noise_floor);
+        let of_all = if is_below {
+            " (rms over all recordings; in one recording it can be smaller or larger)"
+        } else {
+            ""
+        };
+        format!("The noise is {floor} of the force{of_all}.")
     }
 }
 
@@ -246,9 +268,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter if has_findings => {
-            "with the effects found, it explains less of the residual than another candidate"
+            "with the effects found it would still lower the residual, but the search did not select it"
         }
-        RejectionReason::ExplainedBetter => "explains less of the error than another candidate",
+        RejectionReason::ExplainedBetter => "it would lower the error, but the search did not select it",
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
@@ -261,6 +283,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",
         RejectionReason::GainTooSmall => "the gain is too small to matter",
         RejectionReason::TooManyParameters => "the gain is too small for its number of parameters",
+        RejectionReason::LinearlyDependent if has_findings => {
+            "linearly dependent on the columns of the model with the effects found"
+        }
         RejectionReason::LinearlyDependent => "linearly dependent on the columns of the model",
         RejectionReason::NotFinite => "its formula has no finite value at some samples",
     }
@@ -305,7 +330,7 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
 }
 
 /// The sentence about the best error of the geometry that explains as much as the effects found; `None` if there is none.
-pub(super) fn geometry_alternative_text(alternatives: &[GeometryAlternative]) -> Option<String> {
+pub(super) fn geometry_alternative_text(alternatives: &[GeometryAlternative], has_effects: bool) -> Option<String> {
     let best = alternatives.first()?;
     let errors: Vec<String> = best.errors.iter().map(geometry_error_text).collect();
     let has_zero = best.errors.iter().any(|error| error.zero.is_some());
@@ -314,10 +339,31 @@ pub(super) fn geometry_alternative_text(alternatives: &[GeometryAlternative]) ->
     } else {
         ""
     };
-    Some(format!(
-        "Errors of the geometry explain this as well: {}.{zero} Measure the lengths before you change the model.",
-        joined_by_and(&errors)
-    ))
+    let errors = joined_by_and(&errors);
+    Some(if has_effects {
+        format!(
+            "Errors of the geometry explain this as well: {errors}.{zero} Measure the lengths before you change the model."
+        )
+    } else {
+        format!(
+            "Instead of the time base, the geometry may be wrong: {errors}.{zero} The recordings do not distinguish the two, so \
+             check the clock and measure the lengths."
+        )
+    })
+}
+
+/// Sentences about encoders whose error an elastic drive explains as well; `None` if there are none.
+pub(super) fn elastic_alternative_text(alternatives: &[ElasticAlternative]) -> Option<String> {
+    let all: Vec<String> = (alternatives.iter())
+        .map(|one| {
+            format!(
+                "The error of the encoder of {} may be {} instead: the weight deflects an elastic drive once per turn, too.",
+                one.coordinate,
+                effect(&one.compliance)
+            )
+        })
+        .collect();
+    (!all.is_empty()).then(|| all.join(" "))
 }
 
 /// An error of the geometry with its value.
@@ -507,8 +553,14 @@ fn explained_text(claim: &str, diagnosis: &ModelDiagnosis, error: f64, judged: V
     } else {
         "No effect of the library clearly lowers this error."
     };
+    // Errors are those of the forces without the disturbances that were found.
+    let subtracted = if diagnosis.budgets.iter().any(|budget| budget.subtracted > 0.0) {
+        "with the disturbances subtracted, "
+    } else {
+        ""
+    };
     format!(
-        "{claim}: its error {} is {} of the force. {} {lowers}",
+        "{claim}: {subtracted}its error {} is {} of the force. {} {lowers}",
         judged.phrase(),
         percent(Some(error)),
         noise_floor_text(diagnosis)
@@ -592,12 +644,13 @@ pub(crate) fn has_suspicion(diagnosis: &ModelDiagnosis) -> bool {
 /// Disturbances of the recordings by name, each kind once with all its places; `None` without any.
 fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<String> {
     // Kinds in the order of their first disturbance.
-    let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
+    let mut kinds: Vec<(String, Vec<&str>)> = Vec::new();
     for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
         let places = one.at.iter().map(String::as_str);
-        match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {
+        let name = disturbance_kind(one);
+        match kinds.iter_mut().find(|(kind, _)| *kind == name) {
             Some((_, at)) => at.extend(places.filter(|p| *p != "t")),
-            None => kinds.push((&one.kind, places.filter(|p| *p != "t").collect())),
+            None => kinds.push((name, places.filter(|p| *p != "t").collect())),
         }
     }
     let named: Vec<String> = kinds
@@ -608,8 +661,8 @@ fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<Strin
             // A drive may have the same disturbance in several recordings.
             at.retain(|place| seen.insert(*place));
             match at.as_slice() {
-                [] => kind(name),
-                at => format!("{} {}", kind(name), place_list(at, channels)),
+                [] => name,
+                at => format!("{name} {}", place_list(at, channels)),
             }
         })
         .collect();

@@ -12,7 +12,10 @@ use crate::answers::{
     MissingEffectAnswer, NominalDiagnosisAnswer, NominalEffectAnswer, OffNominalAnswer, RecordedIntervalAnswer,
     SelectionStepAnswer, TimeResidualAnswer, UndecidedEffectAnswer, to_json,
 };
-use crate::diagnose::{DiagnosisFindings, EffectEstimate, MissingEffect, UndecidedEffect, words};
+use crate::diagnose::{
+    DiagnosisFindings, EffectEstimate, ElasticAlternative, GeometryError, MissingEffect, UndecidedEffect,
+    is_common_clock, words,
+};
 use crate::faults::is_named_by_verdict;
 use crate::print::{OptionName, Remedy, StepSpelling, note_answers};
 use crate::text::TerminalStyle;
@@ -75,7 +78,11 @@ impl DiagnosisFindings {
             verdict: diagnosis.verdict,
             noise_floor: diagnosis.noise_floor,
             budget: self.budget_answers(),
-            disturbances: self.disturbances().iter().map(disturbance_answer).collect(),
+            disturbances: self
+                .disturbances()
+                .iter()
+                .map(|one| self.disturbance_answer(one))
+                .collect(),
             corrected: self.corrected.iter().map(|fault| fault.answer(spelling)).collect(),
             unresolved: self.unresolved.iter().map(|fault| fault.answer(spelling)).collect(),
             steps: diagnosis.steps.iter().map(step_answer).collect(),
@@ -113,6 +120,39 @@ impl DiagnosisFindings {
             }
         };
         effects.iter().map(answer).collect()
+    }
+
+    /// A disturbance with estimates, recordings and times, and errors of the geometry that explain as much.
+    fn disturbance_answer(&self, one: &Disturbance) -> DisturbanceAnswer {
+        let estimates = one.estimates.iter().map(|quantity| EstimateAnswer {
+            name: quantity.name.clone(),
+            value: quantity.value,
+            std: quantity.standard_deviation,
+            unit: quantity.unit.clone(),
+        });
+        // Alternatives of effects, where there are any, are listed for themselves.
+        let is_alone = is_common_clock(one) && self.missing.is_empty();
+        let alternatives = self.geometry_alternatives.iter().filter(|_| is_alone);
+        let errors = alternatives.flat_map(|one| &one.errors).map(GeometryError::as_effect);
+        let is_here = |other: &&ElasticAlternative| {
+            one.kind == "encoder_eccentricity" && one.at.first() == Some(&other.coordinate)
+        };
+        let elastic = self.elastic_alternatives.iter().filter(is_here);
+        let elastic = elastic.map(|other| other.compliance.clone());
+        let contact = words::is_brief_force(one).then(|| LocatedEffect {
+            kind: "contact_event".to_owned(),
+            at: one.at.clone(),
+        });
+        DisturbanceAnswer {
+            kind: one.kind.clone(),
+            at: one.at.clone(),
+            says: one.description.clone(),
+            estimates: estimates.collect(),
+            recordings: one.recordings.clone(),
+            interval: one.interval,
+            in_verdict: is_named_by_verdict(one),
+            indistinguishable_from: errors.chain(elastic).chain(contact).collect(),
+        }
     }
 
     /// Parts of the residual of each drive, relative to its rms force.
@@ -167,7 +207,7 @@ impl DiagnosisFindings {
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
+        lines.push(style.bold("Error after each step, relative to the force (nrms)"));
         // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
             .map(|step| {
@@ -354,7 +394,12 @@ impl DiagnosisFindings {
                 if let Some(proposal) = &found.separation
                     && let Some(command) = spelling.spell_separation(&self.before.model, proposal)
                 {
-                    lines.push("    To plan a motion that distinguishes them:".to_owned());
+                    let says = format!(
+                        "To plan a motion that distinguishes {} from {}:",
+                        words::effect(&proposal.effect.effect),
+                        words::effects(&proposal.rivals)
+                    );
+                    lines.extend(wrap_words(&says, 96).iter().map(|line| format!("    {line}")));
                     lines.push(format!("      {command}"));
                 }
             }
@@ -558,25 +603,6 @@ pub(super) fn estimate_answers(all: &[EffectEstimate]) -> Vec<EstimateAnswer> {
         unit: one.unit.clone(),
     };
     all.iter().map(answer).collect()
-}
-
-/// A disturbance with estimates, recordings and times.
-fn disturbance_answer(one: &Disturbance) -> DisturbanceAnswer {
-    let estimates = one.estimates.iter().map(|quantity| EstimateAnswer {
-        name: quantity.name.clone(),
-        value: quantity.value,
-        std: quantity.standard_deviation,
-        unit: quantity.unit.clone(),
-    });
-    DisturbanceAnswer {
-        kind: one.kind.clone(),
-        at: one.at.clone(),
-        says: one.description.clone(),
-        estimates: estimates.collect(),
-        recordings: one.recordings.clone(),
-        interval: one.interval,
-        in_verdict: is_named_by_verdict(one),
-    }
 }
 
 /// A step of the search.

@@ -34,16 +34,30 @@ impl DiagnosisFindings {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Errors of the geometry that explain as much as the effects found"));
+        let (what, these) = if self.missing.is_empty() {
+            (
+                "the time base",
+                "the time base: check the clock and measure the lengths.",
+            )
+        } else {
+            ("the effects found", "the effects: measure the lengths.")
+        };
+        lines.push(style.bold(&format!("Errors of the geometry that explain as much as {what}")));
         for one in &self.geometry_alternatives {
             let errors: Vec<String> = one.errors.iter().map(words::geometry_error_text).collect();
             lines.push(format!(
-                "  {} ({:.1} % of what the effects explain)",
+                "  {} ({:.1} % of what {} explain{})",
                 joined_by_and(&errors),
-                100.0 * one.share
+                100.0 * one.share,
+                if self.missing.is_empty() {
+                    "the time base"
+                } else {
+                    "the effects"
+                },
+                if self.missing.is_empty() { "s" } else { "" }
             ));
         }
-        let advice = "These recordings do not distinguish them from the effects: measure the lengths.";
-        lines.extend(wrap_words(advice, 98).iter().map(|line| format!("  {line}")));
+        let advice = format!("These recordings do not distinguish them from {these}");
+        lines.extend(wrap_words(&advice, 98).iter().map(|line| format!("  {line}")));
     }
 }

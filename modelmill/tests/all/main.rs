@@ -1,5 +1,6 @@
 //! The library on recordings that are made for it, with what is in them known.
 
+mod clocks;
 mod draws;
 mod events;
 mod every_model;
