@@ -26,7 +26,7 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! // Of several dependent regressor columns, the column of this product was retained for the base parameter.
+//! // `retained`: the product (here `m1*dc1`) whose regressor column was kept, of several linearly dependent ones.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
@@ -63,7 +63,7 @@
 //! | [`servo::ServoModel::identify`] | base parameters and gains from commands or currents, without forces |
 //! | [`Model::add_actuator_forces`] | recordings with the forces of actuators, computed from their signals |
 //! | [`Model::compare`] | error figures (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
-//! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors over horizons |
+//! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors in simulations of 0.1 s, 1 s and the whole run |
 //! | [`Model::diagnose`] | the physical effects that are missing |
 //! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects with the results pass, fail, not evaluated |
 //! | [`Model::runs`] | changes between recordings of one machine |

@@ -189,8 +189,8 @@ pub(crate) struct DiagnosisArgs {
     /// into blocks (cross-validation)
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) check: Vec<PathBuf>,
-    /// Fix the base parameters at their nominal values, to find out why nominal values are wrong. Default: they are
-    /// estimated
+    /// Fix the base parameters at their nominal values: each difference between model and robot is then an error of the
+    /// forces. Default: they are estimated
     #[arg(long)]
     pub(crate) held: bool,
     /// Base parameters of an earlier fit (a file that `identify` wrote), for example of a run without load. They are

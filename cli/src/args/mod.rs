@@ -62,10 +62,11 @@ pub(crate) struct CommandLine {
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) library: Vec<PathBuf>,
     /// Derive models only for the values of their files: constants become numbers. Fewer base parameters remain if
-    /// lengths are zero or equal, and emitted code has no geometry to change
+    /// lengths are zero or equal, and these numbers can no longer be changed in emitted code
     #[arg(long, global = true)]
     pub(crate) at_values: bool,
-    /// End with an error and exit status 3 if the command takes longer. Files are complete or unchanged
+    /// End with an error and exit status 3 if the command takes longer. Each output file is then either complete or
+    /// not touched
     #[arg(long, global = true, value_name = "SECONDS", value_parser = parse_seconds)]
     pub(crate) time_limit: Option<Duration>,
 }
@@ -192,7 +193,7 @@ pub(crate) enum ProgramCommand {
     /// Test the model against recordings: checks of drives, parameters and effects, with the cause of every failure
     #[command(after_help = verify::HELP)]
     Verify(VerifyArgs),
-    /// Write a diagnosis as one self-contained page: error after each added effect, curves, error maps, candidates,
+    /// Write a diagnosis as one self-contained page: error after each step, curves, error maps, candidates,
     /// parameters, equations
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill report model-spec/models/spidermill.toml \\\n      \

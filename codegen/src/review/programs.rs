@@ -187,7 +187,10 @@ const LETTERS: [(&[&str], &str); 10] = [
     ),
     (&["e", "l"], "vector along a linear drive, and its length"),
     (&["J"], "derivative of a drive's length with respect to a coordinate"),
-    (&["Delta"], "determinant of a small linear system, and its inverse"),
+    (
+        &["Delta"],
+        "determinant of a small linear system; with the index inv, its reciprocal",
+    ),
     (&["k"], "value computed once per geometry"),
     (&["x"], "any other intermediate value"),
 ];

@@ -1,4 +1,4 @@
-//! Figures by which wrong signs and units of a model file show: gravity, total mass, and the size of the mechanism.
+//! Gravity, total mass and size of a mechanism: wrong signs and units in the file are visible in these figures.
 //!
 //! A model goes in; its figures at the values of the file come out.
 

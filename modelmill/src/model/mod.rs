@@ -382,8 +382,7 @@ impl Model {
     }
 
     /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
-    /// an effect. Of several dependent regressor columns, the column of the retained product was kept for this base
-    /// parameter.
+    /// an effect. The retained product is the one whose regressor column was kept, of several linearly dependent ones.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;

@@ -19,7 +19,7 @@ pub struct ModelCheck {
     pub rank: Option<SampledRank>,
     /// Contradictions between the numeric rank and the exact reduction.
     pub warnings: Vec<String>,
-    /// Gravity, mass and size, by which wrong signs and units show.
+    /// Gravity, mass and size: wrong signs and units in the file are visible in these figures.
     pub magnitudes: ModelMagnitudes,
 }
 
@@ -39,7 +39,8 @@ impl Model {
         ModelSummary::new(&self.derivation)
     }
 
-    /// Gravity, total mass and size at the values of the file, by which wrong signs and units show.
+    /// Gravity, total mass and size at the values of the file: wrong signs and units in the file are visible in these
+    /// figures.
     pub fn magnitudes(&self) -> ModelMagnitudes {
         ModelMagnitudes::new(self)
     }

@@ -1,4 +1,4 @@
-//! Limits of the figures by which wrong signs and units of a model file show.
+//! Limits of gravity, mass and size, the figures in which wrong signs and units of a model file are visible.
 
 use std::ops::RangeInclusive;
 

@@ -31,7 +31,8 @@ pub struct PreparedRecording {
     reading: RecordingOptions,
     /// The recording as it was read, with the options as they were requested.
     source: UnpreparedRecording,
-    /// The suspected fault of the recording that explains it best.
+    /// The suspected fault whose correction brings recording and model into the best agreement; `None` if no fault is
+    /// decisive.
     suspect: Option<SuspectedFault>,
     /// Intervals in which drives stick.
     sticks: RecordingSticks,
@@ -204,7 +205,8 @@ impl PreparedRecording {
         self.source.clone()
     }
 
-    /// The suspected fault of the recording that explains it best.
+    /// The suspected fault whose correction brings recording and model into the best agreement; `None` if no fault is
+    /// decisive.
     pub fn suspected_fault(&self) -> Option<&SuspectedFault> {
         self.suspect.as_ref()
     }

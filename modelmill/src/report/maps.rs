@@ -7,6 +7,7 @@ use modelmill_identify::float_to_count;
 
 use super::draw::{PlotAxis, SvgPicture, range};
 use super::units::{force_unit, variable_unit};
+use crate::compare::variable_phrase;
 use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 use crate::text::table::significant;
@@ -156,10 +157,10 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, varia
         let picture = picture(&maps, &grid, &names, unit);
         let _ = writeln!(
             html,
-            "<figure class=\"still\"><figcaption><b>{}: rms error over {} and {}</b></figcaption>\n{picture}</figure>",
+            "<figure class=\"still\"><figcaption><b>rms error of {} over {} and {}</b></figcaption>\n{picture}</figure>",
             escape(drive),
-            escape(&variables[i].0),
-            escape(&variables[j].0),
+            escape(&variable_phrase(&before.model, &variables[i].0)),
+            escape(&variable_phrase(&before.model, &variables[j].0)),
         );
     }
     html

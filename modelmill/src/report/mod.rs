@@ -26,7 +26,7 @@ pub use page::{STYLE, page, scripts};
 pub use runs::{parameter_history, runs_page};
 pub use tables::{TableCell, table};
 
-/// Picture (SVG) of the error after each added effect, on the fitted and on the validation runs, with the noise.
+/// Picture (SVG) of the error after each step, on the fitted and on the validation runs, with the noise.
 pub fn steps_picture(findings: &DiagnosisFindings) -> String {
     steps::picture(findings)
 }

@@ -27,7 +27,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     let mut page = pages::begin(&title);
     // The sections in the order in which a user needs them, each with its id and title.
     let sections = [
-        ("steps", "Error after each added effect", steps_section(findings)),
+        ("steps", "Error after each step", steps_section(findings)),
         (
             "found",
             "Missing effects and next steps",
@@ -110,7 +110,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
         tiles.push(("error of the given model", percent(Some(first.check))));
         if diagnosis.steps.len() > 1 {
-            tiles.push(("error with the effects", percent(Some(last.check))));
+            tiles.push(("error after the last step", percent(Some(last.check))));
         }
     }
     // Errors cannot fall below the noise.
@@ -128,21 +128,22 @@ fn summary(findings: &DiagnosisFindings) -> String {
     )
 }
 
-/// Errors after each added effect, as picture and table, and errors of each drive.
+/// Errors after each step, as picture and table, and errors of each drive.
 fn steps_section(findings: &DiagnosisFindings) -> String {
     // The picture shows the steps, the table has the numbers.
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. \
-         The noise or rounding in the picture and in the summary is the rms value over all recordings; a single one can have \
-         more.</p>\n<ul>\n\
+         The noise or rounding in the picture and in the summary is the rms value over all recordings; in one recording it can \
+         be smaller or larger.</p>\n<ul>\n\
          <li><i>decrease of the squared error</i>: relative to the step before, {}, on the drives on which the added effects \
          act.</li>\n\
          <li><i>t value of the decrease</i>: its mean over blocks of time, divided by its standard error.</li>\n\
-         <li><i>effective samples</i>: the number of independent samples equivalent to these correlated samples.</li>\n\
-         <li><i>upper bound of the noise</i>: from differences of successive samples. Standard deviations of the missing effects \
-         assume this noise, or the residual if that is larger.</li>\n</ul>\n{}",
+         <li><i>effective samples</i>: the number of independent samples that carry as much information as the samples of the \
+         residual, which are correlated in time.</li>\n</ul>\n{}\
+         <p><i>upper bound of the noise</i>: from differences of successive samples. Standard deviations of the missing effects \
+         assume this noise, or the residual if that is larger.</p>\n",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),

@@ -1,4 +1,4 @@
-//! Picture of the error after each added effect, on the fitted and on the validation runs, on a logarithmic
+//! Picture of the error after each step, on the fitted and on the validation runs, on a logarithmic
 //! axis with the noise of the forces.
 
 use super::draw::{PlotAxis, SvgPicture, WIDTH};
@@ -95,5 +95,5 @@ pub(crate) fn picture(findings: &DiagnosisFindings) -> String {
             picture.text("label", at, "end", line);
         }
     }
-    picture.finish("error after each added effect, on fitted and on validation data")
+    picture.finish("error after each step, on fitted and on validation data")
 }

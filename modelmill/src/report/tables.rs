@@ -64,7 +64,7 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
     html
 }
 
-/// Error after each added effect, with the evidence for it.
+/// Error after each step, with the evidence for it.
 pub(crate) fn steps(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     let rows: Vec<Vec<TableCell>> = diagnosis

@@ -225,7 +225,7 @@ impl TourText {
         self.line("");
     }
 
-    /// Errors after each added effect, and the identified parameters.
+    /// Errors after each step, and the identified parameters.
     pub(super) fn steps(&mut self, findings: &DiagnosisFindings) {
         self.heading("5  Identify again: the error falls");
         self.bars(findings);
@@ -287,8 +287,8 @@ impl TourText {
         }
         self.line("");
         self.paragraph(&format!(
-            "Error relative to the force (nrms) on the validation run. The last line ({}) is the rms value over all recordings; a \
-             single recording can have more. The lengths of the bars are on a logarithmic scale.",
+            "Error relative to the force (nrms) on the validation run. The last line ({}) is the rms value over all recordings; \
+             in one recording it can be smaller or larger. The lengths of the bars are on a logarithmic scale.",
             words::floor_label(noise)
         ));
     }
