@@ -336,12 +336,7 @@ impl Model {
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        findings.geometry_alternatives = alternatives_to_effects(&findings, named.as_ref(), held)?;
-        if !findings.share_with_geometry() {
-            findings.share_constants(found.in_place_of_constants.as_ref());
-        }
-        findings.elastic_alternatives =
-            elastic_alternatives(findings.final_version(), &findings.diagnosis.disturbances);
+        findings.find_alternatives(named.as_ref(), held, found.in_place_of_constants.as_ref())?;
         if options.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
@@ -350,6 +345,24 @@ impl Model {
 }
 
 impl DiagnosisFindings {
+    /// Lists errors of the geometry and elastic drives that explain as much as what was found; `best` are errors of the
+    /// geometry in place of wrong constants.
+    ///
+    /// Fails when it is cancelled.
+    fn find_alternatives(
+        &mut self,
+        named: Option<&NamedZeros>,
+        held: FixedParameters,
+        best: Option<&GeometryAlternative>,
+    ) -> Outcome {
+        self.geometry_alternatives = alternatives_to_effects(self, named, held)?;
+        if !self.share_with_geometry() {
+            self.share_constants(best);
+        }
+        self.elastic_alternatives = elastic_alternatives(self.final_version(), &self.diagnosis.disturbances);
+        Ok(())
+    }
+
     /// Effects share their probability with an error of the geometry that explains as much with no more parts: the
     /// recordings cannot distinguish them. Returns whether there is such an error.
     fn share_with_geometry(&mut self) -> bool {
