@@ -26,7 +26,7 @@ fn base_parameters_are_no_bodies() {
     let spidermill = model("spidermill.toml");
     let data = run("with-rods-fit.csv");
     printed(&["identify", &spidermill, "--data", &data, "--out", &fit]);
-    let out = scratch("exported.xml");
+    let out = scratch("exported-base-only.xml");
     let says = refused(1, &["export", &spidermill, "--parameters", &fit, "--out", &out]);
     assert!(says.contains("--physical"), "{says}");
     let says = refused(1, &["export", &model("spidermill-paper.toml"), "--out", &out]);

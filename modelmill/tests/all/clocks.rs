@@ -42,10 +42,11 @@ fn a_clock_and_a_length_are_named_together() {
     let longer = text.replace("L = { value = 0.5,", "L = { value = 0.54,");
     assert_ne!(text, longer);
     let machine = |text: &str| Model::from_text("two_link", text).expect("a model");
-    for (what, found) in [
-        ("length", diagnosis(&machine(&longer), Made::Nothing)),
-        ("clock", diagnosis(&machine(&text), Made::Clock(1.04))),
+    for (what, machine, made) in [
+        ("length", machine(&longer), Made::Nothing),
+        ("clock", machine(&text), Made::Clock(1.04)),
     ] {
+        let found = diagnosis(&machine, made);
         assert!(names_both(&found), "{what}: {}", found.verdict_text());
     }
 }
