@@ -9,7 +9,7 @@ use crate::loops::KinematicLoops;
 use crate::loops::magnitude::{expression_magnitude, nominal_magnitude};
 
 /// A dependent residual counts as zero up to this share of its size. By judgement: nearer to a pose at which assemblies
-/// meet they cannot be told from each other.
+/// meet they cannot be distinguished.
 const CLOSED: f64 = 1e-7;
 
 /// The same as a multiple of the contradiction at the nominal pose: rounded lengths contradict each other more elsewhere.

@@ -48,6 +48,10 @@ fn elastic_drive(version: &ModelVersion, coordinate: &str, [sine, cosine]: [f64;
         .active_coordinates()
         .into_iter()
         .position(|name| name == coordinate)?;
+    // A slide has no turns.
+    if !model.active_coordinate_types()[i].1 {
+        return None;
+    }
     // Friction does not load the gear.
     let carried: Vec<f64> = (model.nominal.iter().enumerate())
         .map(|(k, value)| if model.is_effect(k) { 0.0 } else { *value })

@@ -34,30 +34,30 @@ impl DiagnosisFindings {
             return;
         }
         lines.push(String::new());
-        let (what, these) = if self.missing.is_empty() {
+        // Without effects, a clock was found that wrong lengths explain too.
+        let (what, explain, them) = if self.missing.is_empty() {
             (
                 "the time base",
+                "the time base explains",
                 "the time base: check the clock and measure the lengths.",
             )
         } else {
-            ("the effects found", "the effects: measure the lengths.")
+            (
+                "the effects found",
+                "the effects explain",
+                "the effects: measure the lengths.",
+            )
         };
         lines.push(style.bold(&format!("Errors of the geometry that explain as much as {what}")));
         for one in &self.geometry_alternatives {
             let errors: Vec<String> = one.errors.iter().map(words::geometry_error_text).collect();
             lines.push(format!(
-                "  {} ({:.1} % of what {} explain{})",
+                "  {} ({:.1} % of what {explain})",
                 joined_by_and(&errors),
-                100.0 * one.share,
-                if self.missing.is_empty() {
-                    "the time base"
-                } else {
-                    "the effects"
-                },
-                if self.missing.is_empty() { "s" } else { "" }
+                100.0 * one.share
             ));
         }
-        let advice = format!("These recordings do not distinguish them from {these}");
+        let advice = format!("These recordings do not distinguish them from {them}");
         lines.extend(wrap_words(&advice, 98).iter().map(|line| format!("  {line}")));
     }
 }

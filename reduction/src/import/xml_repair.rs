@@ -13,6 +13,9 @@ use std::fmt::Write as _;
 
 use roxmltree::Document;
 
+/// Largest number of prefixes that are declared: the parser compares each attribute of the root with all others.
+const MOST_PREFIXES: usize = 16;
+
 /// The text as it is if it is XML, otherwise without the faults above.
 pub(super) fn readable_xml(text: &str) -> Cow<'_, str> {
     match Document::parse(text) {
@@ -39,9 +42,7 @@ fn repair_xml(text: &str) -> String {
             _ if rest.starts_with("<?") => to("?>"),
             _ if rest.starts_with("<!") => to(">"),
             _ => {
-                let name = &rest[1..];
-                let end = name.find(|c: char| c.is_whitespace() || "/>".contains(c));
-                root_name_end = root_name_end.or_else(|| Some(out.len() + 1 + end?));
+                root_name_end = root_name_end.or(Some(out.len() + 1 + name_at_start(&rest[1..]).len()));
                 push_tag(rest, &mut out, &mut prefixes)
             }
         };
@@ -54,12 +55,13 @@ fn repair_xml(text: &str) -> String {
         rest = &rest[length..];
     }
     out.push_str(rest);
-    if let Some(end) = root_name_end {
+    let mut known: BTreeSet<&str> = BTreeSet::from(["xml", "xmlns", "xacro"]);
+    known.extend(body.split("xmlns:").skip(1).map(name_at_start));
+    let unknown: Vec<&&str> = prefixes.difference(&known).collect();
+    if let Some(end) = root_name_end.filter(|_| unknown.len() <= MOST_PREFIXES) {
         let mut declared = String::new();
-        for prefix in prefixes.difference(&BTreeSet::from(["xml", "xmlns", "xacro"])) {
-            if !body.contains(&format!("xmlns:{prefix}")) {
-                let _ = write!(declared, " xmlns:{prefix}=\"{prefix}\"");
-            }
+        for prefix in unknown {
+            let _ = write!(declared, " xmlns:{prefix}=\"{prefix}\"");
         }
         out.insert_str(end, &declared);
     }
@@ -67,6 +69,12 @@ fn repair_xml(text: &str) -> String {
     let blank = &text[..text.len() - body.len()];
     out.insert_str(declaration.map_or(0, |end| end + 2), blank);
     out
+}
+
+/// The name at the start of a text, up to white space or the sign that ends a name.
+fn name_at_start(text: &str) -> &str {
+    let end = text.find(|c: char| c.is_whitespace() || "/>=".contains(c));
+    &text[..end.unwrap_or(text.len())]
 }
 
 /// Appends the tag at the start of `text` with a space between any two attributes, and collects the prefixes of its
@@ -119,6 +127,17 @@ mod tests {
         let line = |text: &str, part: &str| text[..text.find(part).unwrap()].matches('\n').count();
         assert_eq!(line(&mended, "<robot"), line(faulty, "<robot"));
         assert_eq!(line(&mended, "<drake"), line(faulty, "<drake"));
+    }
+
+    /// Many prefixes cost no time: none is declared, and the text stays what it was.
+    #[test]
+    fn only_few_prefixes_are_declared() {
+        let many = |n: usize| (0..n).map(|k| format!("<p{k}:a/>")).collect::<Vec<_>>().concat();
+        // One of them is declared already.
+        for (n, is_readable) in [(MOST_PREFIXES + 1, true), (MOST_PREFIXES + 2, false), (100_000, false)] {
+            let text = format!("<robot xmlns:p0='declared'>{}</robot>", many(n));
+            assert_eq!(Document::parse(&readable_xml(&text)).is_ok(), is_readable, "{n}");
+        }
     }
 
     #[test]
