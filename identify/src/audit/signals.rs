@@ -8,8 +8,8 @@ use modelmill_boundary::text::{OptionName, Remedy};
 
 use super::thresholds::{
     BEYOND_LIMIT_ONE_IN, EXACT_LIMIT_SHORTEST_RUN, FEWEST_AT_LIMIT, LARGE_ANGLE_RAD, LIMIT_BAND_MOST_SHARE,
-    LIMIT_BAND_SIGMAS, LIMIT_BAND_WIDTHS, LIMIT_CROWDING, NOISY_LIMIT_FEWEST_SAMPLES, NOISY_LIMIT_ONE_IN,
-    PLATEAU_STEEPNESS, SLOW_UPDATE_FEWEST_CHANGES, SLOW_UPDATE_SHARE,
+    LIMIT_BAND_SIGMAS, LIMIT_BAND_WIDTHS, LIMIT_CROWDING, MOVING_LEAST_SPEED_SHARE, NOISY_LIMIT_FEWEST_SAMPLES,
+    NOISY_LIMIT_ONE_IN, PLATEAU_STEEPNESS, SLOW_UPDATE_FEWEST_CHANGES, SLOW_UPDATE_SHARE, TOP_SPEED_WINDOWS,
 };
 use crate::recording::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::white_noise;
@@ -20,9 +20,10 @@ impl SignalRecording {
     /// are skipped.
     pub fn signal_notes(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<RecordingNote> {
         // Positions show whether the mechanism moves.
-        let positions: Vec<&[f64]> = coordinates
+        let positions: Vec<PositionSignal<'_>> = coordinates
             .iter()
             .filter_map(|(name, _)| self.column(name).ok())
+            .map(PositionSignal::new)
             .collect();
         let mut notes = Vec::new();
         for (name, is_angle) in coordinates {
@@ -93,7 +94,12 @@ impl SignalRecording {
 
     /// Warning about a force that stays at a limit except for noise, although it reaches and leaves the limit with a
     /// slope.
-    fn noisy_saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
+    fn noisy_saturation_note(
+        &self,
+        name: &str,
+        force: &[f64],
+        positions: &[PositionSignal<'_>],
+    ) -> Option<RecordingNote> {
         let n = force.len();
         if n < NOISY_LIMIT_FEWEST_SAMPLES {
             return None;
@@ -135,9 +141,7 @@ impl SignalRecording {
                 let steepest = [before, behind].into_iter().flatten().fold(0.0, f64::max);
                 // At the top of a parabola, slope times length is 8 times the half width of the band; a plateau has
                 // more.
-                // A position differs between both ends of the plateau.
-                let moves = |q: &&[f64]| length > 0 && q[start].total_cmp(&q[i - 1]).is_ne();
-                let is_moving = positions.iter().any(moves);
+                let is_moving = positions.iter().any(|q| length > 0 && q.moves_between(start, i - 1));
                 if is_moving && length >= FEWEST_AT_LIMIT && steepest * length as f64 > PLATEAU_STEEPNESS * spread {
                     count += length;
                     first.get_or_insert(start);
@@ -170,7 +174,7 @@ impl SignalRecording {
 
     /// Warning about a force that stays exactly at its largest or smallest value while the mechanism moves, or is
     /// constant.
-    fn saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
+    fn saturation_note(&self, name: &str, force: &[f64], positions: &[PositionSignal<'_>]) -> Option<RecordingNote> {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
@@ -227,9 +231,34 @@ impl SignalRecording {
     }
 }
 
+/// The recorded positions of a coordinate, with its top speed: a force that is constant while all stand still is no
+/// limit of the drive.
+struct PositionSignal<'a> {
+    values: &'a [f64],
+    /// The largest mean speed over a window of the recording, per sample.
+    top_speed: f64,
+}
+
+impl<'a> PositionSignal<'a> {
+    fn new(values: &'a [f64]) -> Self {
+        let window = (values.len() / TOP_SPEED_WINDOWS).max(1);
+        let speeds = (window..values.len()).map(|i| (values[i] - values[i - window]).abs() / window as f64);
+        Self {
+            values,
+            top_speed: speeds.fold(0.0, f64::max),
+        }
+    }
+
+    /// Whether the coordinate moves noticeably from one sample to a later one.
+    fn moves_between(&self, first: usize, last: usize) -> bool {
+        let moved = (self.values[last] - self.values[first]).abs();
+        moved > MOVING_LEAST_SPEED_SHARE * self.top_speed * (last - first) as f64
+    }
+}
+
 /// Number of samples in which a force is exactly equal to a value, in runs of three or more while a position changes;
 /// and the first of them.
-fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usize>) {
+fn count_at_value(force: &[f64], value: f64, positions: &[PositionSignal<'_>]) -> (usize, Option<usize>) {
     let (mut count, mut first) = (0, None);
     let mut i = 0;
     while i < force.len() {
@@ -238,7 +267,7 @@ fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Op
             i += 1;
         }
         // Something must move during the run of equal values.
-        let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
+        let moves = |q: &PositionSignal<'_>| i > start && q.moves_between(start, i - 1);
         if i - start >= EXACT_LIMIT_SHORTEST_RUN && positions.iter().any(moves) {
             count += i - start;
             first.get_or_insert(start);
@@ -323,6 +352,14 @@ mod tests {
             says(
                 |t| if t < 1.0 { 0.3 } else { t },
                 |t| if t < 1.0 { 9.0 } else { 8.0 - t }
+            ),
+            none
+        );
+        // So may it be if the encoder has noise: a hand moves a pendulum, and holds it.
+        assert_eq!(
+            says(
+                |t| (3.0 * t).min(2.4) + 1e-4 * (9e4 * t).sin(),
+                |t| 9.0 * (3.0 * t).min(2.4).sin() * 0.5 + (3.0 * t).min(2.4) + 1e-3 * (7e4 * t).sin()
             ),
             none
         );

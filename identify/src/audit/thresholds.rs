@@ -16,6 +16,13 @@ pub(super) const SLOW_UPDATE_SHARE: f64 = 0.9;
 /// Angles beyond this value are probably in degrees, rad: two turns to each side. By judgement.
 pub(super) const LARGE_ANGLE_RAD: f64 = 4.0 * PI;
 
+/// Windows of a recording over which the top speed of a coordinate is taken.
+pub(super) const TOP_SPEED_WINDOWS: usize = 500;
+
+/// A coordinate that is slower than this share of its top speed (1) does not move while a force is constant. By
+/// judgement.
+pub(super) const MOVING_LEAST_SPEED_SHARE: f64 = 0.02;
+
 /// Least number of samples at a limit for a saturated force. By judgement.
 pub(super) const FEWEST_AT_LIMIT: usize = 8;
 

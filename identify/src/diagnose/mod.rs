@@ -96,7 +96,10 @@ use bench::{EffectSelector, SelectedEffect};
 use in_time::FoundChange;
 use pool::FitScope;
 use reproducible::repeatable_shares;
-use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, EXPLICABLE_LEAST_NOISE_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
+use thresholds::{
+    EFFECT_LEAST_UNEXPLAINED_RATIO, EXPLICABLE_LEAST_NOISE_RATIO, HIDING_NOISE_SHARE, LARGE_RESIDUAL_SHARE, LEAST_GAIN,
+    REPLACING_LAW_LEAST_SHARE,
+};
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
@@ -111,8 +114,16 @@ pub enum DiagnosisVerdict {
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
     /// A part of the residual remains that no candidate explains: it is repeatable, or it follows the time. Also if the
-    /// recordings are explained only after the correction of a fault.
+    /// recordings are explained only after the correction of a fault, or if noise of half the force or more hides what may
+    /// be missing.
     Unexplained,
+}
+
+impl ModelDiagnosis {
+    /// Whether noise is so large that recordings without a finding do not show that the model is adequate.
+    pub fn is_hidden_by_noise(&self) -> bool {
+        self.noise_floor >= HIDING_NOISE_SHARE
+    }
 }
 
 /// A step of the search: the change of the set of effects and the error after it.
@@ -347,7 +358,11 @@ fn diagnose_cleaned(
     merge_drifting_friction(&mut effects, &mut disturbances);
     // Unexplained residual decides before effects that were found.
     let changes_in_time = (picks.iter()).any(|pick| bench.candidate(pick).nature == CandidateNature::ChangeInTime);
-    let is_explained = unexplained.is_empty() && !changes_in_time && time_residuals.is_empty();
+    let noise_floor = noise_floor(&budgets);
+    let is_explained = unexplained.is_empty()
+        && !changes_in_time
+        && time_residuals.is_empty()
+        && (noise_floor < HIDING_NOISE_SHARE || !effects.is_empty());
     let verdict = match (is_explained, effects.is_empty()) {
         (false, _) => DiagnosisVerdict::Unexplained,
         (true, true) => DiagnosisVerdict::Adequate,
@@ -364,7 +379,7 @@ fn diagnose_cleaned(
     let complete_residual = bench.complete_residual(&picks);
     let diagnosis = ModelDiagnosis {
         verdict,
-        noise_floor: noise_floor(&budgets),
+        noise_floor,
         budgets,
         disturbances,
         steps,
@@ -485,16 +500,16 @@ impl EffectSelector<'_> {
     fn drop_below_unexplained(&mut self, mut picks: Vec<SelectedEffect>) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
             let left = self.set_residual(&picks);
-            // Find the member whose gain is smallest relative to the unexplained repeatable squares on its channels.
+            // Find the member whose gain is smallest relative to the unexplained squares on its channels.
             let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
                 let channels = self.affected_channels(&picks[i..=i]);
-                let squares = |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
-                let unexplained = channels.iter().filter(|d| left.unexplained.contains(d));
-                let stays: f64 = unexplained
-                    .map(|d| left.repeatable_share[*d] * squares(&left.residual, *d))
-                    .sum();
-                if stays <= 0.0 {
+                let repeatable = |d: usize| match left.unexplained.contains(&d) {
+                    true => left.repeatable_share[d] * dot(&left.residual[d], &left.residual[d]),
+                    false => 0.0,
+                };
+                let large: Option<Vec<f64>> = channels.iter().map(|d| self.large_squares(*d, &left)).collect();
+                if large.is_none() && channels.iter().all(|d| repeatable(*d) <= 0.0) {
                     continue;
                 }
                 // Gain of the member: squares that come back when the set is fitted without it.
@@ -503,11 +518,19 @@ impl EffectSelector<'_> {
                 let fewer = self.refresh_columns(fewer);
                 let (factors, _) = self.fit(&fewer, FitScope::All);
                 let rest = self.residual(&fewer, &factors);
-                let squares = |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
-                let gains = channels
-                    .iter()
-                    .map(|d| squares(&rest, *d) - squares(&left.residual, *d));
-                let share = gains.sum::<f64>() / stays;
+                let gain = |d: usize| dot(&rest[d], &rest[d]) - dot(&left.residual[d], &left.residual[d]);
+                let weighted =
+                    |of: &dyn Fn(usize) -> f64| channels.iter().map(|d| self.weights[*d] * of(*d)).sum::<f64>();
+                let of_repeatable = match weighted(&repeatable) {
+                    stays if stays > 0.0 => weighted(&gain) / stays,
+                    _ => f64::INFINITY,
+                };
+                // Where all residuals are large, one channel on which the member explains more is enough.
+                let of_large = large.map_or(f64::INFINITY, |large| {
+                    let shares = channels.iter().zip(&large).map(|(d, stays)| gain(*d) / stays);
+                    shares.fold(0.0, f64::max)
+                });
+                let share = of_repeatable.min(of_large);
                 if share < EFFECT_LEAST_UNEXPLAINED_RATIO && least.as_ref().is_none_or(|(other, _)| share < *other) {
                     least = Some((share, fewer));
                 }
@@ -517,6 +540,15 @@ impl EffectSelector<'_> {
                 None => return (picks, left),
             }
         }
+    }
+
+    /// The squares of a channel beyond its noise if they are a large part of those of the force; `None` otherwise.
+    fn large_squares(&self, channel: usize, left: &SetResidual) -> Option<f64> {
+        let rest = &left.residual[channel];
+        let force = self.problem.measured_force(channel);
+        let beyond_noise = dot(rest, rest) - self.problem.noise[channel].powi(2) * rest.len() as f64;
+        let is_large = beyond_noise > LARGE_RESIDUAL_SHARE.powi(2) * dot(&force, &force);
+        (is_large && !self.problem.is_idle(channel)).then_some(beyond_noise)
     }
 
     /// Whether the residual of a channel is more than noise: a part of it is repeatable, and that share would be enough

@@ -5,12 +5,15 @@
 //! size of the machine, an angle and a time with those of real gears, encoders and amplifiers.
 
 use super::bench::{EffectSelector, SelectedEffect, n_columns};
+use super::column::ForceColumn;
+use super::pool::FitScope;
 use super::problem::{CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, ReadingFaultKind, TIME_BASE};
 use super::thresholds::{
-    GAIN_LEAST, GAIN_MOST, GRID_END_SHARE, PLAUSIBLE_MOST_ANGLE, PLAUSIBLE_MOST_CLOCK_SHARE, PLAUSIBLE_MOST_DELAY,
-    PLAUSIBLE_MOST_FORCE_RATIO, PLAUSIBLE_MOST_LENGTH_SHARE, PLAUSIBLE_MOST_LOAD_SHARE, PLAUSIBLE_MOST_PLAY,
-    PLAUSIBLE_MOST_PLAY_SHARE,
+    GAIN_CHANGE_LEAST, GAIN_LEAST, GAIN_MOST, GRID_END_SHARE, PLAUSIBLE_MOST_ANGLE, PLAUSIBLE_MOST_CLOCK_SHARE,
+    PLAUSIBLE_MOST_DELAY, PLAUSIBLE_MOST_FORCE_RATIO, PLAUSIBLE_MOST_FRICTION_CHANGE, PLAUSIBLE_MOST_LENGTH_SHARE,
+    PLAUSIBLE_MOST_LOAD_SHARE, PLAUSIBLE_MOST_PLAY, PLAUSIBLE_MOST_PLAY_SHARE, SAME_SHAPE_MOST_REST,
 };
+use crate::signal::dot;
 
 /// Largest magnitude of the forces of each channel, N or N m; infinite for a channel without force.
 pub(crate) fn largest_forces(problem: &DiagnosisProblem) -> Vec<f64> {
@@ -85,7 +88,11 @@ impl EffectSelector<'_> {
         for (i, pick) in picks.iter().enumerate() {
             let values = &factors[at..at + pick.columns.len()];
             at += values.len();
-            if self.is_implausible(pick, values) {
+            let drives_back = || {
+                self.friction_change(pick, values)
+                    .is_some_and(|change| change.turns_negative(&self.friction_levels(change.channel, picks)))
+            };
+            if self.is_implausible(pick, values) || drives_back() {
                 implausible.push(i);
             }
         }
@@ -101,6 +108,9 @@ impl EffectSelector<'_> {
         {
             return !(GAIN_LEAST..=GAIN_MOST).contains(&values[0]);
         }
+        if candidate.effect.kind == "gain_change" {
+            return !(GAIN_CHANGE_LEAST..=GAIN_MOST).contains(&values[0]);
+        }
         is_at_end_of_grid(candidate, pick)
             || values
                 .iter()
@@ -114,4 +124,79 @@ impl EffectSelector<'_> {
                     value.abs() > largest_value(candidate, k, self.problem.size) || is_too_strong()
                 })
     }
+
+    /// The change of friction that a drift states; `None` for other effects.
+    fn friction_change(&self, pick: &SelectedEffect, values: &[f64]) -> Option<FrictionChange> {
+        let candidate = self.candidate(pick);
+        if candidate.effect.kind != "friction_drift" {
+            return None;
+        }
+        let channel = (self.problem.layout.channels.iter()).position(|name| candidate.effect.at.contains(name))?;
+        let largest = |shape: &str| {
+            (candidate.parameters.iter().zip(values))
+                .filter(|(parameter, _)| parameter.symbol.contains(shape))
+                .fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
+        };
+        let rate = self.problem.friction.get(3 * channel)?.0[channel].as_ref()?;
+        Some(FrictionChange {
+            channel,
+            viscous: largest("Fv"),
+            dry: largest("Fc"),
+            top_speed: rate.iter().fold(0.0, |most, v| most.max(v.abs())),
+        })
+    }
+
+    /// Viscous and dry friction of a channel in the base and in a set; `None` for what neither has as a column of its own.
+    fn friction_levels(&self, channel: usize, picks: &[SelectedEffect]) -> [Option<f64>; 2] {
+        let (factors, _) = self.fit(picks, FitScope::All);
+        let all = || {
+            let base = self.problem.base.iter();
+            let of_set = picks.iter().flat_map(|pick| {
+                let is_drift = self.candidate(pick).is_per_run;
+                (pick.columns.iter()).map(move |k| (!is_drift).then(|| self.pool.column(*k)))
+            });
+            base.map(Some).chain(of_set).zip(&factors)
+        };
+        [0, 1].map(|which| {
+            let shape = self.problem.friction.get(3 * channel + which)?.0[channel].as_ref()?;
+            let levels = all().filter_map(|(column, factor)| Some(factor * multiple_of(column?, channel, shape)?));
+            levels.reduce(|sum, level| sum + level)
+        })
+    }
+}
+
+/// By how much the friction of a channel changes over a recording, at most.
+struct FrictionChange {
+    /// The channel.
+    channel: usize,
+    /// Change of the viscous friction, N s/m or N m s/rad.
+    viscous: f64,
+    /// Change of the dry friction, N or N m.
+    dry: f64,
+    /// Largest speed of the drive, m/s or rad/s.
+    top_speed: f64,
+}
+
+impl FrictionChange {
+    /// Whether the change turns friction into a force that drives: at the start or the end of the recording half of it
+    /// is missing. `levels` are viscous and dry friction in the middle, where they are known.
+    fn turns_negative(&self, levels: &[Option<f64>; 2]) -> bool {
+        let [viscous, dry] = *levels;
+        let slack = |level: f64| PLAUSIBLE_MOST_FRICTION_CHANGE * level.max(0.0);
+        let is_dry_negative = dry.is_some_and(|dry| self.dry / 2.0 > slack(dry));
+        let is_sum_negative = dry.zip(viscous).is_some_and(|(dry, viscous)| {
+            let change = self.dry / 2.0 + self.viscous / 2.0 * self.top_speed;
+            change > slack(dry + viscous * self.top_speed)
+        });
+        is_dry_negative || is_sum_negative
+    }
+}
+
+/// The factor by which a column is a multiple of a shape that acts on one channel only; `None` if it is none.
+fn multiple_of(column: &ForceColumn, channel: usize, shape: &[f64]) -> Option<f64> {
+    let acts_elsewhere = (column.0.iter().enumerate()).any(|(d, values)| d != channel && values.is_some());
+    let values = column.0[channel].as_ref().filter(|_| !acts_elsewhere)?;
+    let factor = dot(values, shape) / dot(shape, shape);
+    let rest = values.iter().zip(shape).map(|(x, s)| (x - factor * s).powi(2));
+    (rest.sum::<f64>() < SAME_SHAPE_MOST_REST * dot(values, values)).then_some(factor)
 }

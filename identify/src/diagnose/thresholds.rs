@@ -88,6 +88,14 @@ pub(super) const FULL_CANCELLATION_SHARE: f64 = 0.03;
 /// judgement.
 pub(super) const PLAUSIBLE_MOST_FORCE_RATIO: f64 = 5.0;
 
+/// Half of the change of friction over a recording is at most this multiple of the friction in its middle (1): beyond 1
+/// friction drives the machine at the start or at the end. By judgement.
+pub(super) const PLAUSIBLE_MOST_FRICTION_CHANGE: f64 = 1.1;
+
+/// A column of the model has the shape of friction if less than this share of its squares is left (1): decimation smooths
+/// the switch of dry friction, which leaves 0.07 on a fast pendulum; the rate leaves 0.5 of a switch.
+pub(super) const SAME_SHAPE_MOST_REST: f64 = 0.2;
+
 /// Largest plausible error of a length, as a part of the largest distance of two frames (1). By judgement.
 pub(super) const PLAUSIBLE_MOST_LENGTH_SHARE: f64 = 0.3;
 
@@ -118,6 +126,10 @@ pub(super) const GAIN_LEAST: f64 = -0.75;
 
 /// Largest plausible relative error of the scale of a force signal (1). By judgement.
 pub(super) const GAIN_MOST: f64 = 3.0;
+
+/// Least plausible relative change of the scale of a force signal during a recording (1): at -1 the signal is dead, beyond
+/// it has the wrong sign. By judgement, with some uncertainty.
+pub(super) const GAIN_CHANGE_LEAST: f64 = -1.1;
 
 /// A wrong scale of a force signal must leave at most this share of the squared error of its drive, on data that was not
 /// fitted (1). By judgement.
@@ -185,9 +197,13 @@ pub(super) const EXCHANGE_LEAST_DECREASE: f64 = 1.0;
 /// Two members whose criteria differ by less than this (1) are equally good. By judgement.
 pub(super) const EQUALLY_GOOD_DIFFERENCE: f64 = 5.0;
 
-/// An effect is dropped if it explains less than this many times the repeatable squares that stay unexplained on its
-/// channels (1): an unknown law is as likely there. By definition.
+/// An effect is dropped if it explains less than this many times the squares that stay unexplained on its channels (1): an
+/// unknown law is as likely there. By definition.
 pub(super) const EFFECT_LEAST_UNEXPLAINED_RATIO: f64 = 1.0;
+
+/// A residual of this share of the force (1) counts as unexplained even if it is not repeatable. By judgement, from a
+/// pendulum whose measured torque does not follow its motion.
+pub(super) const LARGE_RESIDUAL_SHARE: f64 = 0.5;
 
 // --- alternatives, probabilities and what is undetermined
 
@@ -369,6 +385,12 @@ pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
 /// Chosen on loads that are taken up during a recording (`lab/numpy-plant/unseen.py`): six more parameters of a wrong change
 /// lower the rest by a few percent, the inertia of a heavy load by half.
 pub(super) const GENERAL_CHANGE_REST: f64 = 0.7;
+
+// --- verdict
+
+/// Noise of this share of the force (1) hides what may be missing: without a finding a model is not called adequate. By
+/// judgement, from a pendulum whose torque has noise of 0.83.
+pub(super) const HIDING_NOISE_SHARE: f64 = 0.5;
 
 // --- residual that follows the time
 

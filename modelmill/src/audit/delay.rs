@@ -5,10 +5,10 @@ use modelmill_identify::{DelayAudit, DelayEstimate, ForceDelays, RecordingNote};
 
 use super::rows::AuditRows;
 use super::thresholds::{
-    COMMON_DELAY_FEWEST_DRIVES, DELAY_LEAST_GAIN, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS,
-    DELAY_REVERSAL_RATE_SHARE, DELAY_WARNING_GAIN, LONGEST_DELAY_S, LONGEST_DELAY_SHARE, LONGEST_DELAY_STEPS,
-    PROMPT_DRIVE_MOST_HALF_WIDTH, SAME_DELAY_TOLERANCE_STEPS, SINGLE_DELAY_LEAST_GAIN, SINGLE_DELAY_LEAST_HALF_WIDTHS,
-    SINGLE_DELAY_LEAST_STEPS,
+    COMMON_DELAY_FEWEST_DRIVES, DELAY_LEAST_GAIN, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS, DELAY_MOST_RESIDUAL,
+    DELAY_REVERSAL_RATE_SHARE, DELAY_WARNING_GAIN, LONG_DELAY_LEAST_GAIN, LONG_DELAY_S, LONG_DELAY_STEPS,
+    LONGEST_DELAY_S, LONGEST_DELAY_SHARE, LONGEST_DELAY_STEPS, PROMPT_DRIVE_MOST_HALF_WIDTH,
+    SAME_DELAY_TOLERANCE_STEPS, SINGLE_DELAY_LEAST_GAIN, SINGLE_DELAY_LEAST_HALF_WIDTHS, SINGLE_DELAY_LEAST_STEPS,
 };
 use crate::model::Model;
 use crate::segment::RecordingSegment;
@@ -104,9 +104,20 @@ impl ForceDelayAudit {
         // At least two drives must show the delay on their own.
         let telling = |one: &&DelayEstimate| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
         let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(COMMON_DELAY_FEWEST_DRIVES);
-        let is_there =
-            self.is_clear(all, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS) && self.gain(1) > DELAY_LEAST_GAIN;
+        let is_there = self.is_clear(all, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS)
+            && self.gain(1) > self.least_gain(all)
+            && geometric_mean(&self.delays.residuals[1]) < DELAY_MOST_RESIDUAL;
         (agree && is_there).then_some(all)
+    }
+
+    /// How much a delay of all drives must lower the residual (1): a long one must explain a large part.
+    fn least_gain(&self, delay: DelayEstimate) -> f64 {
+        let is_long = delay.seconds.abs() > LONG_DELAY_S.max(LONG_DELAY_STEPS * self.step);
+        if is_long {
+            LONG_DELAY_LEAST_GAIN
+        } else {
+            DELAY_LEAST_GAIN
+        }
     }
 
     /// Drives whose force signals are delayed while those of the other drives are clearly not.

@@ -222,6 +222,9 @@ pub(super) const GROUP_LEAST_OVERLAP: f64 = 0.7;
 /// An event of a single drive exceeds this share of its rms force (1).
 pub(super) const ALONE_LEAST_FORCE_SHARE: f64 = 0.03;
 
+/// It stands out by this factor (1): wrists of the Panda have residuals of friction of 8 to 9.5.
+pub(super) const ALONE_LEAST_DEVIATIONS: f64 = 10.0;
+
 /// Share of the samples of an event of a single drive that may show no contact (1), unless it is large: the KUKA KR300
 /// and a double pendulum have residuals about reversals that are hidden by 0.34 or more.
 pub(super) const ALONE_MOST_MASKED_SHARE: f64 = 0.33;
@@ -296,6 +299,16 @@ pub(super) const SAME_DELAY_TOLERANCE_STEPS: f64 = 0.1;
 
 /// A delay of all drives must lower the residual by more than this share (1). By judgement.
 pub(super) const DELAY_LEAST_GAIN: f64 = 0.003;
+
+/// With the delay the residual is below this share of the force (1): where the model explains little, the delay is no
+/// more than a part of the fit. By judgement.
+pub(super) const DELAY_MOST_RESIDUAL: f64 = 0.5;
+
+/// A delay is long beyond this time, s, and this many steps of the recording. It must lower the residual by more than
+/// this share (1): a double pendulum without delay has 0.14 at 248 ms.
+pub(super) const LONG_DELAY_S: f64 = 0.05;
+pub(super) const LONG_DELAY_STEPS: f64 = 2.5;
+pub(super) const LONG_DELAY_LEAST_GAIN: f64 = 0.3;
 
 /// A delay of a single drive must lower the residual of the drive by more than this share (1). By judgement.
 pub(super) const SINGLE_DELAY_LEAST_GAIN: f64 = 0.03;

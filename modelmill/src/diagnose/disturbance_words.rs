@@ -1,7 +1,7 @@
 //! Sentences about disturbances of recordings. Input are disturbances of a diagnosis, output is English text without line
 //! breaks.
 
-use modelmill_identify::diagnose::Disturbance;
+use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
 
 use crate::text::names::joined_by_and;
 use crate::text::table::{all_digits, number, percent, significant};
@@ -60,7 +60,12 @@ fn share_of_samples(one: &Disturbance) -> String {
 
 /// All estimates with standard deviations and units; `words` writes the name of an estimate.
 fn values_text(one: &Disturbance, words: impl Fn(&str) -> String) -> String {
-    let values: Vec<String> = (one.estimates.iter())
+    values_of(one.estimates.iter(), words)
+}
+
+/// Some estimates with standard deviations and units; `words` writes the name of an estimate.
+fn values_of<'a>(estimates: impl Iterator<Item = &'a EstimatedQuantity>, words: impl Fn(&str) -> String) -> String {
+    let values: Vec<String> = estimates
         .map(|q| {
             let deviation = q.standard_deviation;
             let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
@@ -76,9 +81,29 @@ fn values_text(one: &Disturbance, words: impl Fn(&str) -> String) -> String {
     values.join(", ")
 }
 
+/// A drifting zero of a force as a clause. Values within twice their uncertainty are left out, unless all are.
+fn offset_drift(one: &Disturbance, at: &str) -> String {
+    let is_clear = |q: &&EstimatedQuantity| q.value.abs() > 2.0 * q.standard_deviation.unwrap_or(0.0);
+    let is_change = |q: &&EstimatedQuantity| q.name.starts_with(OFFSET_CHANGE);
+    let clear = || one.estimates.iter().filter(is_clear);
+    if clear().any(|q| is_change(&q)) {
+        let all = values_of(clear(), offset_name);
+        format!("the zero of the measured force of {at} drifts with time: {all}")
+    } else if clear().next().is_some() {
+        let all = values_of(clear(), |name| name.strip_prefix("F0 ").unwrap_or(name).to_owned());
+        format!("the zero of the measured force of {at} differs between the recordings: {all}")
+    } else {
+        let all = values_text(one, offset_name);
+        format!("the zero of the measured force of {at} drifts with time: {all}")
+    }
+}
+
+/// How the name of a change of an offset starts; the recording follows.
+const OFFSET_CHANGE: &str = "change of F0 in ";
+
 /// The estimate of an offset drift in words, by its name.
 fn offset_name(name: &str) -> String {
-    if let Some(recording) = name.strip_prefix("change of F0 in ") {
+    if let Some(recording) = name.strip_prefix(OFFSET_CHANGE) {
         format!("change from start to end of {recording}")
     } else if let Some(recording) = name.strip_prefix("F0 in ") {
         format!("offset in the middle of {recording}")
@@ -118,10 +143,7 @@ pub fn disturbance(one: &Disturbance) -> String {
                 frequencies.join(" and ")
             )
         }
-        "offset_drift" => format!(
-            "the zero of the measured force of {at} drifts with time: {}",
-            values_text(one, offset_name)
-        ),
+        "offset_drift" => offset_drift(one, &at),
         "friction_drift" => {
             format!("the friction of {at} changes during a recording, as it does when a joint warms up: {all}")
         }

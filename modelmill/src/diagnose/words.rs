@@ -308,6 +308,19 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let falls = error_reduction_text(first, last, channels, judged);
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
+        DiagnosisVerdict::Unexplained
+            if found.is_empty() && is_all_explained(diagnosis) && diagnosis.is_hidden_by_noise() =>
+        {
+            format!(
+                "{} Smaller effects are hidden by the noise: record larger and faster motions, or a better signal of the force.",
+                explained_text(
+                    "These recordings cannot show whether the model is adequate",
+                    diagnosis,
+                    last.check,
+                    judged
+                )
+            )
+        }
         // After a correction nothing is left to explain, but the recordings as they are stay unexplained.
         DiagnosisVerdict::Unexplained if found.is_empty() && is_all_explained(diagnosis) => format!(
             "{} The recordings as they are count as unexplained: repeat the diagnosis once the fault is corrected.",

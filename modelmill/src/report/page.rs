@@ -101,6 +101,9 @@ fn summary(findings: &DiagnosisFindings) -> String {
         DiagnosisVerdict::Unexplained if words::has_only_changes_in_time(diagnosis) => {
             ("unexplained", "a change during a recording explains the error")
         }
+        DiagnosisVerdict::Unexplained if diagnosis.is_hidden_by_noise() => {
+            ("unexplained", "noise hides what may be missing")
+        }
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
     // The same sentences as in the text output.

@@ -7,10 +7,10 @@ use super::peak::largest_force;
 use super::segments::DriveSegment;
 use super::trace::ResidualTrace;
 use crate::audit::thresholds::{
-    ALONE_LEAST_FORCE_SHARE, ALONE_MOST_MASKED_SHARE, BRIEF_EVENT_S, BRIEF_LEAST_DEVIATIONS, BRIEF_LEAST_FORCE_SHARE,
-    EVENT_GAP_S, EVENT_LEAST_POWER, FAINT_HIT_MOST_DEVIATIONS, FAINT_LEAST_CONTRAST, FAINT_MOST_DEVIATIONS,
-    FAINT_SHORT_LEAST_DEVIATIONS, FAINT_SHORTEST_S, GROUP_CLEAR_DEVIATIONS, GROUP_LEAST_CONTRAST,
-    GROUP_LEAST_DEVIATION_SHARE, GROUP_LEAST_OVERLAP, GROUP_TIME_SHARE, GROUP_TIME_TOLERANCE_S,
+    ALONE_LEAST_DEVIATIONS, ALONE_LEAST_FORCE_SHARE, ALONE_MOST_MASKED_SHARE, BRIEF_EVENT_S, BRIEF_LEAST_DEVIATIONS,
+    BRIEF_LEAST_FORCE_SHARE, EVENT_GAP_S, EVENT_LEAST_POWER, FAINT_HIT_MOST_DEVIATIONS, FAINT_LEAST_CONTRAST,
+    FAINT_MOST_DEVIATIONS, FAINT_SHORT_LEAST_DEVIATIONS, FAINT_SHORTEST_S, GROUP_CLEAR_DEVIATIONS,
+    GROUP_LEAST_CONTRAST, GROUP_LEAST_DEVIATION_SHARE, GROUP_LEAST_OVERLAP, GROUP_TIME_SHARE, GROUP_TIME_TOLERANCE_S,
     HIDDEN_LEAST_DEVIATIONS, MOST_COUNTED_DEVIATIONS, SHARP_LEAST_DEVIATIONS, SHOWN_LEAST_DEVIATION_SHARE,
 };
 
@@ -93,7 +93,8 @@ fn is_clear_alone(rest: &SearchedResidual, segment: &DriveSegment, lasted: f64) 
     let is_shown = segment.masked_share < ALONE_MOST_MASKED_SHARE || segment.deviations > HIDDEN_LEAST_DEVIATIONS;
     let is_short = lasted < FAINT_SHORTEST_S && segment.deviations < FAINT_SHORT_LEAST_DEVIATIONS;
     let is_sharp = segment.deviations > FAINT_MOST_DEVIATIONS || segment.edge_contrast > FAINT_LEAST_CONTRAST;
-    is_large || (lasted >= BRIEF_EVENT_S && is_shown && is_sharp && is_large_enough && !is_short)
+    let stands_out = segment.deviations > ALONE_LEAST_DEVIATIONS;
+    is_large || (lasted >= BRIEF_EVENT_S && is_shown && is_sharp && is_large_enough && stands_out && !is_short)
 }
 
 /// The event of segments that agree; `None` if it does not stand out enough.
