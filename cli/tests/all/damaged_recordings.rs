@@ -196,6 +196,10 @@ fn defaults_are_an_experts() {
         &["kuka-kr300/kuka_A.csv", "kuka-kr300/kuka_B.csv"],
         "kuka-kr300/kuka_C.csv",
     );
+    let pendulums = [0, 1, 2, 3, 4].map(|k| format!("machines/double-pendulum/trajectory_0{k}.csv"));
+    let pendulums = pendulums.each_ref().map(String::as_str);
+    let pendulum_model = text("machines/double-pendulum/dp_A_full.toml");
+    let swing_up = "machines/simple-pendulum/ddp_data_measured.csv";
     let from_positions = ["--trim", "1000", "--derivatives", "positions"];
     let cases = [
         case("EMPS", model("emps.toml"), emps.0, emps.1, "40", 5.59),
@@ -204,6 +208,23 @@ fn defaults_are_an_experts() {
         of_panda("Panda", 0.87, &["--trim", "1000"]),
         of_panda("Panda, positions only", 1.7 / 1.15, &from_positions),
         case("KUKA", text("kuka-kr300/kuka_full.toml"), kuka.0, kuka.1, "8", 11.24),
+        case(
+            "double pendulum",
+            pendulum_model,
+            &pendulums[..4],
+            pendulums[4],
+            "15",
+            55.5,
+        ),
+        // The expert has no other run either.
+        case(
+            "pendulum",
+            text("machines/simple-pendulum/sp_full.toml"),
+            &[swing_up],
+            swing_up,
+            "15",
+            17.5,
+        ),
     ];
     for Case {
         name,

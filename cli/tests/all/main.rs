@@ -35,6 +35,7 @@ mod in_browser;
 mod interpret;
 mod json;
 mod languages;
+mod measured;
 mod next_step;
 mod pages;
 mod pictures;

@@ -4,12 +4,15 @@
 //! Decision: a fault that one recording shows clearly is corrected in the other recordings as well if it explains them
 //! better, since one machine and one logger made them.
 
+use std::sync::Arc;
+
 use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance};
 
 use crate::error::{Error, Outcome};
 use crate::faults::{ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score};
 use crate::model::Model;
-use crate::recording::PreparedRecording;
+use crate::progress::SilentProgress;
+use crate::recording::{PreparedRecording, UnpreparedRecording};
 use crate::text::names::joined_by_and;
 
 use super::completion::ModelCompletion;
@@ -133,8 +136,7 @@ impl CorrectedRecordings {
             return Ok(false);
         }
         self.model = turned;
-        self.check = all.split_off(self.fit.len());
-        self.fit = all;
+        self.prepare_together(&all)?;
         self.corrected.push(fault);
         Ok(true)
     }
@@ -166,13 +168,27 @@ impl CorrectedRecordings {
             }
             *one = corrected;
         }
-        self.check = all.split_off(self.fit.len());
-        self.fit = all;
+        self.prepare_together(&all)?;
         match self.corrected.iter_mut().find(|one| one.clause == fault.clause) {
             Some(one) => one.recordings.extend(fault.recordings),
             None => self.corrected.push(fault),
         }
         Ok(true)
+    }
+
+    /// Takes corrected recordings, those of the fit first, and prepares them again with common choices: those of the
+    /// recordings with the fault mean nothing.
+    ///
+    /// Fails when a recording cannot be prepared, or when the job is cancelled.
+    fn prepare_together(&mut self, all: &[PreparedRecording]) -> Outcome<()> {
+        let sources: Vec<UnpreparedRecording> = all.iter().map(PreparedRecording::before_preparation).collect();
+        let silent = self.model.host().clone().with_progress(Arc::new(SilentProgress));
+        let silent = self.model.clone().with_host(&silent);
+        let prepared = PreparedRecording::new_together(&silent, &sources, self.fit.len());
+        let mut prepared: Vec<PreparedRecording> = prepared.into_iter().collect::<Outcome<_>>()?;
+        self.check = prepared.split_off(self.fit.len());
+        self.fit = prepared;
+        Ok(())
     }
 }
 

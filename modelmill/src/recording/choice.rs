@@ -33,7 +33,7 @@ use super::raised_cutoff::{ComparedBand, RaisedWindow, is_harmless};
 use super::smoother::{SmootherCandidate, series_up_to};
 use super::stick::StickPhases;
 use super::thresholds::{
-    DECIMATION_FEWEST_KEPT, SAME_RATE_TOLERANCE, SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN,
+    DECIMATION_FEWEST_KEPT, EXTENSION_LEAST_GAIN, SAME_RATE_TOLERANCE, SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN,
     SUITED_CUTOFF_PASSBANDS, SUITED_MOST_GROWTH, WINDOW_FEWEST_SAMPLES,
 };
 use crate::error::Outcome;
@@ -51,7 +51,7 @@ const HIGHEST: f64 = 0.2;
 const FARTHEST: f64 = 8.0;
 /// The lowest cut-off, relative to the band of the forces.
 const LOWEST: f64 = 0.15;
-/// How often the list of cut-offs is extended by two lower ones if the lowest is the best.
+/// How often the list of cut-offs is extended by two lower ones if the residual falls to its end.
 const MOST_EXTENSIONS: usize = 3;
 /// Number of octaves above the band of the motion that are evaluated.
 const OCTAVES: usize = 2;
@@ -145,6 +145,17 @@ impl SmootherTrials {
     /// The chosen smoother with its residual.
     fn best(&self) -> (SmootherCandidate, HeldOutResidual) {
         self.all[self.best]
+    }
+
+    /// Whether the last smoother is the best one, and clearly better than the one before: a smoother one may be better
+    /// still.
+    fn falls_to_the_end(&self) -> bool {
+        match self.all.as_slice() {
+            [.., (_, before), (_, last)] => {
+                self.best + 1 == self.all.len() && last.figure < before.figure - EXTENSION_LEAST_GAIN
+            }
+            _ => false,
+        }
     }
 
     /// How the residual grows with the neighbours of the best, one phrase each.
@@ -317,7 +328,7 @@ impl<'a> SmootherSearch<'a> {
         )
     }
 
-    /// Tests low-passes with the given cut-offs in decreasing order, and lower ones as long as the last is the best:
+    /// Tests low-passes with the given cut-offs in decreasing order, and lower ones as long as the residual clearly falls:
     /// vibrations and noise can make the band of the motion appear too wide. Also returns the windows of the tests.
     fn try_low_passes(&self, mut cutoffs: Vec<f64>) -> Option<(Vec<Vec<TimeWindow>>, SmootherTrials)> {
         let mut last: Option<(Vec<Vec<TimeWindow>>, SmootherTrials)> = None;
@@ -331,9 +342,9 @@ impl<'a> SmootherSearch<'a> {
                 Some((looked_at, trials))
             });
             let Some((looked_at, trials)) = tried else { break };
-            let is_lowest_best = trials.best + 1 == ladder.len();
+            let still_falls = trials.falls_to_the_end();
             last = Some((looked_at, trials));
-            if !is_lowest_best {
+            if !still_falls {
                 break;
             }
             let lowest = cutoffs[cutoffs.len() - 1];

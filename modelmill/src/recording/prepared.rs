@@ -53,7 +53,7 @@ impl PreparedRecording {
 
     /// As [`Self::new`], for recordings of one machine, with choices that are common to all that have the same options.
     /// The first `fitted` of them belong to a fit.
-    pub(super) fn new_together(model: &Model, recordings: &[UnpreparedRecording], fitted: usize) -> Vec<Outcome<Self>> {
+    pub(crate) fn new_together(model: &Model, recordings: &[UnpreparedRecording], fitted: usize) -> Vec<Outcome<Self>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
         for (index, one) in recordings.iter().enumerate() {
             let has_same = |group: &&mut Vec<usize>| one.has_same_preparation(&recordings[group[0]]);
