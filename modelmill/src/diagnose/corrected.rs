@@ -9,7 +9,9 @@ use std::sync::Arc;
 use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance};
 
 use crate::error::{Error, Outcome};
-use crate::faults::{ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score};
+use crate::faults::{
+    ColumnOperation, CorrectionScore, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score,
+};
 use crate::model::Model;
 use crate::progress::SilentProgress;
 use crate::recording::{PreparedRecording, UnpreparedRecording};
@@ -45,7 +47,9 @@ impl CorrectedRecordings {
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
     ) -> Outcome<Option<Self>> {
-        if !fit.iter().chain(check).any(|one| one.suspected_fault().is_some()) {
+        let each: Vec<&PreparedRecording> = fit.iter().chain(check).copied().collect();
+        let has_fault = each.iter().any(|one| one.suspected_fault().is_some());
+        if !has_fault && PreparedRecording::find_common_fault(model, &each).is_none() {
             return Ok(None);
         }
         let copies = |all: &[&PreparedRecording]| all.iter().map(|one| (*one).clone()).collect();
@@ -99,9 +103,13 @@ impl CorrectedRecordings {
         Ok(Some(all))
     }
 
-    /// The first fault that is found, with all recordings that have it. One that several faults explain comes first,
+    /// The first fault that is found, with all recordings that have it: a sign or an exchange that all have, before others. One that several faults explain comes first,
     /// since nothing can be corrected then.
     fn next_fault(&self) -> Option<SuspectedFault> {
+        let each: Vec<&PreparedRecording> = self.fit.iter().chain(&self.check).collect();
+        if let Some(common) = PreparedRecording::find_common_fault(&self.model, &each) {
+            return Some(common);
+        }
         let found = self
             .fit
             .iter()
@@ -123,7 +131,7 @@ impl CorrectedRecordings {
             let corrected = one.corrected(&turned, &[])?;
             if !fault.recordings.iter().any(|file| file == one.file()) && one.suspected_fault().is_none() {
                 let score = correction_score((&self.model, &one.segments), (&turned, &corrected.segments));
-                let score = score.unwrap_or(0.0);
+                let score = score.map_or(0.0, |score| score.gain);
                 if score > SHARED_FAULT_LEAST_SCORE {
                     fault.recordings.push(one.file().to_owned());
                 } else if score < -SHARED_FAULT_LEAST_SCORE {
@@ -161,7 +169,11 @@ impl CorrectedRecordings {
             };
             if !has_it {
                 let score = correction_score((&self.model, &one.segments), (&self.model, &corrected.segments));
-                if score.is_none_or(|score| score < SHARED_FAULT_LEAST_SCORE) {
+                let is_sign = fault.kind == RecordingFaultKind::WrongSign;
+                let has_it_too = |score: &CorrectionScore| {
+                    score.gain > SHARED_FAULT_LEAST_SCORE || is_sign && score.is_asked_by_friction
+                };
+                if !score.as_ref().is_some_and(has_it_too) {
                     continue;
                 }
                 fault.recordings.push(one.file().to_owned());

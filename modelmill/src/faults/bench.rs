@@ -9,7 +9,9 @@ use modelmill_identify::{ScaledNormalEquations, gram};
 use nalgebra::{DMatrix, DVector};
 
 use super::correction::{ForceChange, MotionChange};
-use super::thresholds::{BENCH_FEWEST_SAMPLES, FIT_ERROR_FLOOR, NOMINAL_ERROR_CAP, NOMINAL_ERROR_FLOOR};
+use super::thresholds::{
+    BENCH_FEWEST_SAMPLES, FIT_ERROR_FLOOR, LEAST_DISSIPATION, NOMINAL_ERROR_CAP, NOMINAL_ERROR_FLOOR,
+};
 use crate::model::Model;
 use crate::segment::RecordingSegment;
 
@@ -50,6 +52,9 @@ pub(super) struct HypothesisErrors {
     /// With nominal values of the bodies, and friction and an offset of each drive fitted, relative to the error with
     /// friction and offset alone: below 1 if the nominal values explain something.
     pub(super) nominal: Option<Vec<Option<f64>>>,
+    /// Power that the fitted friction of each drive dissipates, relative to the product of the rms values of its rate and
+    /// its force (1): negative if friction drives the machine, which it cannot.
+    pub(super) dissipation: Vec<Option<f64>>,
 }
 
 impl HypothesisErrors {
@@ -59,6 +64,7 @@ impl HypothesisErrors {
         Self {
             fit: all(1.0),
             nominal: bench.nominal.as_ref().map(|_| all(NOMINAL_ERROR_CAP)),
+            dissipation: vec![None; bench.forces.len()],
         }
     }
 
@@ -73,6 +79,19 @@ impl HypothesisErrors {
         match (&before.nominal, &self.nominal) {
             (Some(before), Some(after)) => log_gain(before, after, bounded),
             _ => 0.0,
+        }
+    }
+
+    /// Number of drives that friction brakes and that it would drive `before`; 0 if it drives others instead.
+    pub(super) fn drives_braked_instead(&self, before: &Self) -> usize {
+        let pairs = || before.dissipation.iter().zip(&self.dissipation);
+        let is_turned = |before: f64, after: f64| before < -LEAST_DISSIPATION && after > LEAST_DISSIPATION;
+        let is_as_good = |before: f64, after: f64| after > before.min(LEAST_DISSIPATION) - LEAST_DISSIPATION;
+        let both = || pairs().filter_map(|(before, after)| Some(((*before)?, (*after)?)));
+        if both().all(|(before, after)| is_turned(before, after) || is_as_good(before, after)) {
+            both().filter(|(before, after)| is_turned(*before, *after)).count()
+        } else {
+            0
         }
     }
 
@@ -215,8 +234,10 @@ impl<'a> FaultBench<'a> {
 
     /// The errors with the forces after a change.
     pub(super) fn errors(&self, rows: &HypothesisRows, change: &ForceChange) -> HypothesisErrors {
+        let (fit, dissipation) = rows.fit_errors(change);
         HypothesisErrors {
-            fit: rows.fit_errors(change),
+            fit,
+            dissipation,
             nominal: self.nominal.as_ref().map(|values| rows.nominal_errors(change, values)),
         }
     }
@@ -274,6 +295,8 @@ struct ChannelMoments {
     right: Vec<DVector<f64>>,
     /// Sum of squares of each force.
     squares: Vec<f64>,
+    /// The columns of this drive alone with all columns.
+    own: DMatrix<f64>,
     /// The columns of the model without the part that those of this drive alone explain.
     reduced: ReducedMoments,
 }
@@ -304,10 +327,26 @@ impl ChannelMoments {
             column_squares: normal.diagonal().rows(0, base).into_owned(),
             friction: normal.view((base, base), (many, many)).into_owned(),
             nominal: nominal.map(|values| normal.columns(0, base) * DVector::from_column_slice(values)),
+            own: normal.rows(base, MORE).into_owned(),
             reduced: ReducedMoments::new(&normal, &right, &squares)?,
             right,
             squares,
         })
+    }
+}
+
+impl ChannelMoments {
+    /// Power of the friction of this drive, which is fitted to `factor` times a force beside the `values` of the model;
+    /// relative to the rms values of rate and force.
+    fn dissipation(&self, values: &DVector<f64>, source: usize, factor: f64, squares: f64) -> Option<f64> {
+        let base = values.len();
+        let normal = self.own.columns(base, MORE).into_owned();
+        let right = self.right[source].rows(base, MORE) * factor - self.own.columns(0, base) * values;
+        let own = ScaledNormalEquations::new(normal, RIDGE)?.solve(&right);
+        // Products of the rate with itself and with its sign.
+        let power = own[0] * self.own[(0, base)] + own[1] * self.own[(0, base + 1)];
+        let size = (self.own[(0, base)] * squares).sqrt();
+        (size > 0.0).then(|| power / size)
     }
 }
 
@@ -335,12 +374,13 @@ impl ReducedMoments {
 
 impl HypothesisRows {
     /// Relative error of each drive with all parameters fitted. Drives are weighted by their errors, so that a small
-    /// drive counts as much as a large one.
-    fn fit_errors(&self, change: &ForceChange) -> Vec<Option<f64>> {
+    /// drive counts as much as a large one. Also returns the dissipation of each drive.
+    fn fit_errors(&self, change: &ForceChange) -> (Vec<Option<f64>>, Vec<Option<f64>>) {
         let n = self.channels.len();
         let base = self.base;
         let squares: Vec<f64> = (0..n).map(|d| change.squares(d, &self.channels[d].squares)).collect();
         let mut errors: Vec<Option<f64>> = squares.iter().map(|s| (*s > 0.0).then_some(1.0)).collect();
+        let mut dissipation = vec![None; n];
         for _ in 0..ROUNDS {
             let mut normal = DMatrix::zeros(base, base);
             let mut column_squares = DVector::zeros(base);
@@ -360,7 +400,7 @@ impl HypothesisRows {
                 }
             }
             let Some(solver) = ScaledNormalEquations::after_elimination(normal, &column_squares, RIDGE) else {
-                return errors;
+                return (errors, dissipation);
             };
             let values = solver.solve(&right);
             for (d, channel) in self.channels.iter().enumerate() {
@@ -371,10 +411,11 @@ impl HypothesisRows {
                     + values.dot(&(&reduced.normal * &values));
                 if let Some(error) = &mut errors[d] {
                     *error = (left.max(0.0) / squares[d]).sqrt();
+                    dissipation[d] = channel.dissipation(&values, source, factor, squares[d]);
                 }
             }
         }
-        errors
+        (errors, dissipation)
     }
 
     /// Error of each drive with nominal values of the base parameters, and friction and an offset fitted, relative to

@@ -5,9 +5,9 @@ use modelmill_boundary::text::Message;
 
 use super::bench::{FaultBench, HypothesisErrors, HypothesisRows};
 use super::thresholds::{
-    EQUIVALENT_ERROR_TOLERANCE, FIT_GAIN_DECISIVE, FIT_LOSS_TOLERANCE, FIT_MOST_RATIO, MOTION_LEAST_ERROR,
-    MOTION_LEAST_NOMINAL_ERROR, NOMINAL_AFTER_MOST, NOMINAL_BEFORE_LEAST, NOMINAL_GAIN_DECISIVE,
-    NOMINAL_LOSS_TOLERANCE, RIVAL_MARGIN,
+    EQUIVALENT_ERROR_TOLERANCE, FIT_GAIN_DECISIVE, FIT_LOSS_TOLERANCE, FIT_MOST_RATIO, FRICTION_LEAST_FIT_GAIN,
+    LEAST_DISSIPATION, MOTION_LEAST_ERROR, MOTION_LEAST_NOMINAL_ERROR, NOMINAL_AFTER_MOST, NOMINAL_BEFORE_LEAST,
+    NOMINAL_GAIN_DECISIVE, NOMINAL_LOSS_TOLERANCE, RIVAL_MARGIN, SIGN_RIVAL_MARGIN,
 };
 use super::{
     ENTRIES, FaultCorrection, FaultHypothesis, FaultSubject, ForceChange, MotionChange, RecordingFaultKind,
@@ -48,7 +48,34 @@ impl JudgedHypothesis {
             && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
             && ratios.any(|ratio| ratio < FIT_MOST_RATIO);
         let is_likely = self.hypothesis.is_implausible_now && self.fit_gain > -FIT_LOSS_TOLERANCE && self.score() > 0.0;
-        is_fitted || is_likely || self.is_decided_by_nominal(before)
+        is_fitted || is_likely || self.is_decided_by_nominal(before) || self.is_decided_by_friction(before)
+    }
+
+    /// Whether friction decides, which brakes a machine whatever its model: with the signs as they are recorded it would
+    /// drive some drives, and with the other signs it brakes all of them. The fit must agree, unless all forces turn.
+    fn is_decided_by_friction(&self, before: &HypothesisErrors) -> bool {
+        if self.hypothesis.kind != RecordingFaultKind::WrongSign {
+            return false;
+        }
+        let (before, after) = (&before.dissipation, &self.errors.dissipation);
+        let pairs = || {
+            before
+                .iter()
+                .zip(after)
+                .filter_map(|(before, after)| Some(((*before)?, (*after)?)))
+        };
+        let is_turned = |(before, after): (f64, f64)| before < -LEAST_DISSIPATION && after > LEAST_DISSIPATION;
+        let stays = |(before, after): (f64, f64)| after > before.min(LEAST_DISSIPATION) - LEAST_DISSIPATION;
+        let turns_all = pairs().count() > 1 && pairs().all(is_turned);
+        let least_gain = if turns_all {
+            -FIT_LOSS_TOLERANCE
+        } else {
+            FRICTION_LEAST_FIT_GAIN
+        };
+        pairs().any(is_turned)
+            && pairs().all(|pair| is_turned(pair) || stays(pair))
+            && self.fit_gain > least_gain
+            && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
     }
 
     /// Whether the nominal values decide, as they must for a sign or a unit that a fit absorbs.
@@ -111,9 +138,14 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
         return Some(fault);
     }
     let best = decisive.first()?;
+    let margin = if best.is_decided_by_friction(&before) {
+        SIGN_RIVAL_MARGIN
+    } else {
+        RIVAL_MARGIN
+    };
     let rivals: Vec<&JudgedHypothesis> = decisive[1..]
         .iter()
-        .filter(|one| one.score() > best.score() - RIVAL_MARGIN)
+        .filter(|one| one.score() > best.score() - margin)
         .collect();
     let is_unique = rivals.iter().all(|one| one.is_equivalent(best));
     let evidence = evidence_text(&before, &best.errors, rows.is_some());
@@ -139,12 +171,20 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
     })
 }
 
-/// Sum over the drives of the logarithms by which the errors of a recording fall by a correction, fitted and with nominal
-/// values; `None` if they cannot be compared. Both states have a model, since gravity is corrected there.
+/// What a correction does to a recording.
+pub(crate) struct CorrectionScore {
+    /// Sum over the drives of the logarithms by which errors fall, fitted and with nominal values.
+    pub(crate) gain: f64,
+    /// Whether friction brakes the machine with the correction and would drive it without, at about the same fit.
+    pub(crate) is_asked_by_friction: bool,
+}
+
+/// What a correction does to a recording; `None` if the errors cannot be compared. Both states have a model, since gravity
+/// is corrected there.
 pub(crate) fn correction_score(
     before: (&Model, &[RecordingSegment]),
     after: (&Model, &[RecordingSegment]),
-) -> Option<f64> {
+) -> Option<CorrectionScore> {
     let errors = |(model, segments): (&Model, &[RecordingSegment])| {
         let bench = FaultBench::new(model, segments)?;
         Some(match bench.rows(&MotionChange::None) {
@@ -153,7 +193,11 @@ pub(crate) fn correction_score(
         })
     };
     let [before, after] = [errors(before)?, errors(after)?];
-    Some(after.fit_gain(&before) + after.nominal_gain(&before))
+    let gain = after.fit_gain(&before) + after.nominal_gain(&before);
+    Some(CorrectionScore {
+        gain,
+        is_asked_by_friction: after.drives_braked_instead(&before) > 0 && gain > -FIT_LOSS_TOLERANCE,
+    })
 }
 
 /// Clause, advice and places of hypotheses that explain a recording equally well.

@@ -155,17 +155,33 @@ impl PreparedRecording {
         })
     }
 
-    /// Looks for faults that make the numbers meaningless; without one also for delays, contacts and pushes.
-    fn examine(&mut self, model: &Model) {
+    /// The sign or the exchange of columns that all recordings of a machine have, from one fit to all of them; `None` if
+    /// none is decisive. One recording alone may be too short to distinguish the sign of a force from that of an angle.
+    pub(crate) fn find_common_fault(model: &Model, all: &[&Self]) -> Option<SuspectedFault> {
+        let [first, _, ..] = all else { return None };
+        let segments: Vec<RecordingSegment> = all.iter().flat_map(|one| one.segments.iter().cloned()).collect();
+        let mut fault = find_fault(&first.fault_subject(model, &segments))?;
+        let is_common = [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
+        fault.recordings = all.iter().map(|one| one.file().to_owned()).collect();
+        (is_common && fault.is_correctable()).then_some(fault)
+    }
+
+    /// What the search for faults sees of this recording, with segments of it or of all recordings.
+    fn fault_subject<'a>(&'a self, model: &'a Model, segments: &'a [RecordingSegment]) -> FaultSubject<'a> {
         let source = self.reading.preparation.source;
-        let suspect = find_fault(&FaultSubject {
+        FaultSubject {
             model,
             raw: &self.raw,
-            segments: &self.segments,
+            segments,
             uses_recorded_derivatives: source == DerivativeSource::RecordedFirst,
             has_mapping: !self.source.reading.columns.is_empty()
                 || !model.derivation.mechanism.recording.columns.is_empty(),
-        });
+        }
+    }
+
+    /// Looks for faults that make the numbers meaningless; without one also for delays, contacts and pushes.
+    fn examine(&mut self, model: &Model) {
+        let suspect = find_fault(&self.fault_subject(model, &self.segments));
         let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
         let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
         // Forces that are delayed by a large part of a period resemble those of another drive, or of another sign.
