@@ -386,6 +386,12 @@ pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
 /// lower the rest by a few percent, the inertia of a heavy load by half.
 pub(super) const GENERAL_CHANGE_REST: f64 = 0.7;
 
+/// A drive that is slower than this share of its top speed (1) hardly moves: a change of its signal is not believed if it
+/// moves faster for less than the second share (1) of the time with the change, or of the time without it. The KUKA KR300
+/// creeps for 2 s before its motion.
+pub(super) const SLOW_RATE_SHARE: f64 = 0.05;
+pub(super) const MOVING_LEAST_SHARE: f64 = 0.2;
+
 // --- verdict
 
 /// Noise of this share of the force (1) hides what may be missing: without a finding a model is not called adequate. By

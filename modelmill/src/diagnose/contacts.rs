@@ -30,36 +30,40 @@ pub(super) fn is_contact(one: &Disturbance) -> bool {
     one.kind == "contact_event"
 }
 
-/// Whether contacts, found without knowledge of changes in time, may be such changes: a recording has both, or contacts last
-/// for a large part of it, so that little is left that could show a change. `all` are the recordings.
-pub(super) fn are_contacts_doubtful(disturbances: &[Disturbance], all: &SegmentList<'_>) -> bool {
+/// Contacts that stay although a search found changes in time, if some are doubtful; `None` if none is. A contact, found
+/// without knowledge of changes, may be a change that acts on its drives. Contacts that last for a large part of a recording
+/// leave little that could show a change: then none of them stays. `all` are the recordings.
+pub(super) fn contacts_beside_changes(disturbances: &[Disturbance], all: &SegmentList<'_>) -> Option<Vec<Disturbance>> {
     let total = |file: &str| -> f64 {
         let segments = all.iter().filter(|(one, _)| one.run.file == file);
         let span = |time: &[f64]| Some(time.last()? - time.first()?);
         segments.filter_map(|(one, _)| span(&one.run.time)).sum()
     };
-    let mut files = all.iter().map(|(one, _)| one.run.file.as_str());
-    let lasts_long = |file: &str| {
+    let lasts_long = |file: &String| {
         let contacts = disturbances
             .iter()
-            .filter(|one| is_contact(one) && one.recordings.iter().any(|other| other == file));
+            .filter(|one| is_contact(one) && one.recordings.contains(file));
         let intervals = contacts.filter_map(|one| one.interval);
         let sum: f64 = intervals.map(|[from, to]| to - from).sum();
         sum > CONTACTS_MOST_SHARE * total(file)
     };
-    has_contact_and_change(disturbances) || files.any(lasts_long)
+    let contacts: Vec<&Disturbance> = disturbances.iter().filter(|one| is_contact(one)).collect();
+    let is_sure = |one: &&Disturbance| !is_beside_change(one, disturbances) && !one.recordings.iter().any(lasts_long);
+    let sure: Vec<Disturbance> = contacts.iter().copied().filter(is_sure).cloned().collect();
+    (sure.len() < contacts.len()).then_some(sure)
 }
 
-/// Whether a recording has both a contact and a change in time.
-fn has_contact_and_change(disturbances: &[Disturbance]) -> bool {
+/// Whether the recording of a contact has a change in time that acts on one of its drives, as a load does on all.
+fn is_beside_change(contact: &Disturbance, disturbances: &[Disturbance]) -> bool {
     let is_change = |one: &&Disturbance| one.interval.is_some() && !is_contact(one);
-    let changed: Vec<&String> = disturbances
+    let acts_on_it = |one: &Disturbance| {
+        let is_of_signal = ["offset_step", "gain_change"].contains(&one.kind.as_str());
+        !is_of_signal || one.at.iter().any(|place| contact.at.contains(place))
+    };
+    disturbances
         .iter()
         .filter(is_change)
-        .flat_map(|one| &one.recordings)
-        .collect();
-    let mut contacts = disturbances.iter().filter(|one| is_contact(one));
-    contacts.any(|one| one.recordings.iter().any(|file| changed.contains(&file)))
+        .any(|one| one.recordings.iter().any(|file| contact.recordings.contains(file)) && acts_on_it(one))
 }
 
 /// The contacts of a problem that the residual of a search still has, `[drive][sample]`: the audit fits each recording by
@@ -486,21 +490,31 @@ mod tests {
         assert_eq!(share_in_residual(2.0, &[]), None);
     }
 
-    /// A contact beside a change of the same recording is doubtful; one of another recording is not.
+    /// A contact beside a change of the same recording is doubtful if the change acts on its drive; one of another
+    /// recording is not.
     #[test]
     fn contacts_of_changed_recordings_are_doubtful() {
-        let at = |kind: &str, file: &str, interval: Option<[f64; 2]>| Disturbance {
+        let at = |kind: &str, place: &str, file: &str| Disturbance {
             kind: kind.to_owned(),
-            at: vec!["one".to_owned()],
+            at: vec![place.to_owned()],
             estimates: Vec::new(),
             recordings: vec![file.to_owned()],
-            interval,
+            interval: Some([1.0, 1.5]),
             description: None,
         };
-        let contact = at("contact_event", "a.csv", Some([1.0, 1.5]));
-        let change = |file: &str| at("payload_change", file, Some([1.2, 9.0]));
-        assert!(has_contact_and_change(&[contact.clone(), change("a.csv")]));
-        assert!(!has_contact_and_change(&[contact.clone(), change("b.csv")]));
-        assert!(!has_contact_and_change(&[contact, at("outliers", "a.csv", None)]));
+        let contact = at("contact_event", "one", "a.csv");
+        for (kind, place, file, is_doubtful) in [
+            ("payload_change", "tool", "a.csv", true),
+            ("payload_change", "tool", "b.csv", false),
+            ("offset_step", "one", "a.csv", true),
+            ("offset_step", "two", "a.csv", false),
+        ] {
+            let change = at(kind, place, file);
+            assert_eq!(
+                is_beside_change(&contact, &[contact.clone(), change]),
+                is_doubtful,
+                "{kind} {place} {file}"
+            );
+        }
     }
 }

@@ -23,7 +23,7 @@ use super::clock::clock;
 use super::columns::{self, CandidateOrigin, load_dependent_columns, refined_columns};
 use super::constants::{ClaimedConstant, constants};
 use super::contacts::{
-    are_contacts_doubtful, contacts_in_residual, drop_doubtful_contacts, keep_contacts, leave_out_late_contacts,
+    contacts_beside_changes, contacts_in_residual, drop_doubtful_contacts, keep_contacts, leave_out_late_contacts,
 };
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
@@ -190,11 +190,8 @@ pub(crate) fn find_missing_effects(
     let mut diagnosis = search(&mut problem)?;
     // The audit knows neither changes in time, nor delays and other effects that the search finds: they look like
     // contacts, and the contacts that are left once they are known are found below.
-    let kept = if are_contacts_doubtful(&diagnosis.disturbances, &all) {
-        Some(Vec::new())
-    } else {
-        contacts_in_residual(&problem, &all, &diagnosis.complete_residual, &without_contacts)
-    };
+    let kept = contacts_beside_changes(&diagnosis.disturbances, &all)
+        .or_else(|| contacts_in_residual(&problem, &all, &diagnosis.complete_residual, &without_contacts));
     if let Some(kept) = kept.filter(|_| query.in_full) {
         keep_contacts(&mut problem, &all, kept, &without_contacts);
         (problem.measured, problem.removed) = forces.clone();

@@ -14,13 +14,16 @@ mod products;
 mod profile;
 mod residual;
 
+use std::ops::Range;
+
 use super::column::ForceColumn;
 use super::problem::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, LocatedEffect,
     SignConstraint,
 };
 use super::thresholds::{
-    CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, GENERAL_CHANGE_REST, INTERVAL_LEAST_ADVANTAGE, SIMPLER_CHANGE_SHARE,
+    CHANGE_LEAST_ADVANTAGE, CHANGE_LEAST_SHARE, GENERAL_CHANGE_REST, INTERVAL_LEAST_ADVANTAGE, MOVING_LEAST_SHARE,
+    SIMPLER_CHANGE_SHARE, SLOW_RATE_SHARE,
 };
 use products::BlockProducts;
 use profile::{TimeProfile, slow_profiles};
@@ -161,9 +164,12 @@ fn find_change(
         let Some(best) = best_profile(products, k, r) else {
             continue;
         };
+        let samples = products.refine_times(k, r, &best.profile);
+        if is_signal_at_standstill(problem, shape, &recording.samples, &samples) {
+            continue;
+        }
         explained += best.gain;
         remaining -= best.gain + best.of_level;
-        let samples = products.refine_times(k, r, &best.profile);
         let last = recording.samples.end - 1;
         intervals.push(ChangeInterval {
             recording: recording.name.clone(),
@@ -199,6 +205,33 @@ fn find_change(
         explained,
         remaining: remaining.max(0.0),
     })
+}
+
+/// Whether the drive of a changed signal stands for nearly all of the time with the change, or for nearly all of the time
+/// without it: friction takes any value at standstill, which looks like another zero. `recording` and `changed` are samples.
+fn is_signal_at_standstill(
+    problem: &DiagnosisProblem,
+    shape: &ChangeShape,
+    recording: &Range<usize>,
+    changed: &Range<usize>,
+) -> bool {
+    let place = |name: &String| problem.layout.channels.iter().position(|channel| channel == name);
+    let is_signal = ["offset_step", "gain_change"].contains(&shape.effect.kind.as_str());
+    let channel = shape.effect.at.first().and_then(place).filter(|_| is_signal);
+    let rate = channel.and_then(|d| problem.friction.get(3 * d)?.0[d].as_ref());
+    let Some(rate) = rate else { return false };
+    let slowest = SLOW_RATE_SHARE * top_speed(rate);
+    let moves_within = |samples: &mut dyn Iterator<Item = usize>| {
+        let (mut all, mut moving) = (0_usize, 0_usize);
+        for i in samples {
+            all += 1;
+            moving += usize::from(rate[i].abs() > slowest);
+        }
+        all == 0 || moving as f64 > MOVING_LEAST_SHARE * all as f64
+    };
+    let is_changed = |i: &usize| changed.contains(i);
+    !moves_within(&mut recording.clone().filter(is_changed))
+        || !moves_within(&mut recording.clone().filter(|i| !is_changed(i)))
 }
 
 /// The step or interval of a shape that explains most in a recording.
