@@ -334,9 +334,9 @@ impl<'a> ContactSamples<'a> {
     }
 }
 
-/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also
-/// predicts the force beyond the place at other times. Without other
-/// times nothing shows a stop. The model is fitted to the samples before the place.
+/// Whether the force of an event is that of a stop: a force that begins at the place and grows along a line over the depth,
+/// fitted at all other times together with the model, also predicts the force during the event. Without other times beyond
+/// the place nothing shows a stop.
 fn is_force_beyond_place(
     problem: &DiagnosisProblem,
     channel: usize,
@@ -353,54 +353,40 @@ fn is_force_beyond_place(
     if (0..depths.len()).filter(is_otherwise).count() < REPEATED_PLACE_FEWEST_SAMPLES {
         return false;
     }
+    let beyond = |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
+        let force = |depth: &f64| if *depth >= 0.0 { of(*depth) } else { 0.0 };
+        depths.iter().map(force).collect()
+    };
+    let stop = [beyond(&|_| 1.0), beyond(&|depth| depth)];
     // The friction of the drive is part of the model here, since bodies alone would leave it in the residual.
     let friction = problem.friction.get(3 * channel..3 * channel + 3);
-    let columns: Vec<Option<&[f64]>> = (problem.base.iter())
-        .chain(friction.unwrap_or_default())
+    let of_model = problem.base.iter().chain(friction.unwrap_or_default());
+    let columns: Vec<Option<&[f64]>> = of_model
         .map(|column| column.0[channel].as_deref())
+        .chain(stop.iter().map(|column| Some(column.as_slice())))
         .collect();
-    // The model is fitted to samples before the place and away from the event.
-    let is_elsewhere = |i: usize| !about[i] && depths[i] < 0.0;
-    let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| is_elsewhere(*i)).collect();
-    let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
-    let picked: Vec<Option<Vec<f64>>> = columns.iter().map(|column| column.map(some)).collect();
-    let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
-    // Normal equations are enough, since only predictions are needed.
-    let mut moments = NormalEquations::new(columns.len());
-    moments.add_rows(&picked, &some(measured));
-    let factors = moments.solve().values;
-    // The residual of the model at any sample.
-    let rest = |i: usize| {
-        let predicted = columns.iter().zip(factors.iter());
-        let predicted = predicted.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));
-        measured[i] - predicted.sum::<f64>()
+    let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| !about[*i]).collect();
+    // Squares of the force of the event that the first `n` columns leave, fitted at all other times.
+    let left_by = |n: usize| -> f64 {
+        let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
+        let picked: Vec<Option<Vec<f64>>> = columns[..n].iter().map(|column| column.map(some)).collect();
+        let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
+        // Normal equations are enough, since only predictions are needed.
+        let mut moments = NormalEquations::new(n);
+        moments.add_rows(&picked, &some(measured));
+        let factors = moments.solve().values;
+        let predicted = |i: usize| -> f64 {
+            let terms = columns[..n].iter().zip(factors.iter());
+            terms
+                .map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]))
+                .sum()
+        };
+        let event = (0..measured.len()).filter(|i| inside[*i]);
+        event.map(|i| (measured[i] - predicted(i)).powi(2)).sum()
     };
-    let beyond = |is_event: bool| -> Vec<(f64, f64)> {
-        (0..measured.len())
-            .filter(|i| depths[*i] >= 0.0 && if is_event { inside[*i] } else { !about[*i] })
-            .map(|i| (depths[i], rest(i)))
-            .collect()
-    };
-    // Samples beyond the place, in the event and at other times.
-    let (during, otherwise) = (beyond(true), beyond(false));
-    let Some(line) = fit_line(&during) else {
-        return false;
-    };
-    // The line must explain most of the force at other times.
-    let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
-    let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
-    left < REPEATED_PLACE_MOST_RESIDUAL * whole
-}
-
-/// The straight line through some points by least squares.
-fn fit_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
-    // Means, slope and intercept.
-    let n = points.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let spread = mean(&|p| (p.0 - x).powi(2));
-    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / spread;
-    (spread > 0.0).then_some(move |at: f64| y + slope * (at - x))
+    // The line must explain most of the force that the model leaves.
+    let n = columns.len();
+    left_by(n) < REPEATED_PLACE_MOST_RESIDUAL * left_by(n - stop.len())
 }
 
 /// Contacts in the order of the recordings: close ones are joined.
