@@ -6,7 +6,7 @@ use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, TimeResidual};
 
 use super::thresholds::{
     CONTACT_GAP_S, CONTACT_LEAST_KNOWN_SHARE, CONTACT_LEAST_RESIDUAL_RATIO, CONTACT_LEAST_REST_SHARE,
-    CONTACTS_MOST_SHARE, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACTS_MOST_SHARE, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_LEAST_SHARE, REPEATED_PLACE_MOST_RESIDUAL,
 };
 use crate::audit::events::{
     ResidualTrace, event_disturbance, find_events, left_out_interval, motion_of_drives, slowest_rate, standing_states,
@@ -334,9 +334,11 @@ impl<'a> ContactSamples<'a> {
     }
 }
 
-/// Whether the force of an event is that of a stop: a force that begins at the place and grows along a line over the depth,
-/// fitted at all other times together with the model, also predicts the force during the event. Without other times beyond
-/// the place nothing shows a stop.
+/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also predicts the
+/// force beyond the place at other times. Without other times nothing shows a stop.
+///
+/// The force is what the model leaves that is fitted before the place. Beyond it this model may be far off by itself: one
+/// that is fitted to all other times must also leave a force beyond the place.
 fn is_force_beyond_place(
     problem: &DiagnosisProblem,
     channel: usize,
@@ -349,44 +351,72 @@ fn is_force_beyond_place(
         return false;
     };
     // Without other samples beyond the place nothing shows that the force acts there at other times.
-    let is_otherwise = |i: &usize| depths[*i] >= 0.0 && !about[*i];
-    if (0..depths.len()).filter(is_otherwise).count() < REPEATED_PLACE_FEWEST_SAMPLES {
+    let is_otherwise = |i: usize| depths[i] >= 0.0 && !about[i];
+    let is_during = |i: usize| depths[i] >= 0.0 && inside[i];
+    if (0..depths.len()).filter(|i| is_otherwise(*i)).count() < REPEATED_PLACE_FEWEST_SAMPLES {
         return false;
     }
-    let beyond = |of: &dyn Fn(f64) -> f64| -> Vec<f64> {
-        let force = |depth: &f64| if *depth >= 0.0 { of(*depth) } else { 0.0 };
-        depths.iter().map(force).collect()
+    let of_all = residual_of_model(problem, channel, measured, |i| !about[i]);
+    let mean_square = |is_one: &dyn Fn(usize) -> bool| {
+        let chosen: Vec<f64> = (0..of_all.len()).filter(|i| is_one(*i)).map(|i| of_all[i]).collect();
+        chosen.iter().map(|x| x * x).sum::<f64>() / chosen.len().max(1) as f64
     };
-    let stop = [beyond(&|_| 1.0), beyond(&|depth| depth)];
-    // The friction of the drive is part of the model here, since bodies alone would leave it in the residual.
+    if mean_square(&is_otherwise) < REPEATED_PLACE_LEAST_SHARE.powi(2) * mean_square(&is_during) {
+        return false;
+    }
+    let of_before = residual_of_model(problem, channel, measured, |i| !about[i] && depths[i] < 0.0);
+    let beyond = |is_one: &dyn Fn(usize) -> bool| -> Vec<(f64, f64)> {
+        let chosen = (0..measured.len()).filter(|i| is_one(*i));
+        chosen.map(|i| (depths[i], of_before[i])).collect()
+    };
+    let (during, otherwise) = (beyond(&is_during), beyond(&is_otherwise));
+    let Some(line) = fit_line(&during) else {
+        return false;
+    };
+    // The line must explain most of the force at other times.
+    let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
+    let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
+    left < REPEATED_PLACE_MOST_RESIDUAL * whole
+}
+
+/// The force of a channel without that of the model and of friction, both fitted to some samples, `[sample]`: bodies alone
+/// would leave the friction.
+fn residual_of_model(
+    problem: &DiagnosisProblem,
+    channel: usize,
+    measured: &[f64],
+    is_fitted: impl Fn(usize) -> bool,
+) -> Vec<f64> {
     let friction = problem.friction.get(3 * channel..3 * channel + 3);
-    let of_model = problem.base.iter().chain(friction.unwrap_or_default());
-    let columns: Vec<Option<&[f64]>> = of_model
+    let columns: Vec<Option<&[f64]>> = (problem.base.iter())
+        .chain(friction.unwrap_or_default())
         .map(|column| column.0[channel].as_deref())
-        .chain(stop.iter().map(|column| Some(column.as_slice())))
         .collect();
-    let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| !about[*i]).collect();
-    // Squares of the force of the event that the first `n` columns leave, fitted at all other times.
-    let left_by = |n: usize| -> f64 {
-        let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
-        let picked: Vec<Option<Vec<f64>>> = columns[..n].iter().map(|column| column.map(some)).collect();
-        let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
-        // Normal equations are enough, since only predictions are needed.
-        let mut moments = NormalEquations::new(n);
-        moments.add_rows(&picked, &some(measured));
-        let factors = moments.solve().values;
-        let predicted = |i: usize| -> f64 {
-            let terms = columns[..n].iter().zip(factors.iter());
-            terms
-                .map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]))
-                .sum()
-        };
-        let event = (0..measured.len()).filter(|i| inside[*i]);
-        event.map(|i| (measured[i] - predicted(i)).powi(2)).sum()
+    let fitted: Vec<usize> = (0..measured.len()).filter(|i| is_fitted(*i)).collect();
+    let some = |values: &[f64]| -> Vec<f64> { fitted.iter().map(|i| values[*i]).collect() };
+    let picked: Vec<Option<Vec<f64>>> = columns.iter().map(|column| column.map(some)).collect();
+    let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
+    // Normal equations are enough, since only predictions are needed.
+    let mut moments = NormalEquations::new(columns.len());
+    moments.add_rows(&picked, &some(measured));
+    let factors = moments.solve().values;
+    let rest = |i: usize| {
+        let predicted = columns.iter().zip(factors.iter());
+        let predicted = predicted.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));
+        measured[i] - predicted.sum::<f64>()
     };
-    // The line must explain most of the force that the model leaves.
-    let n = columns.len();
-    left_by(n) < REPEATED_PLACE_MOST_RESIDUAL * left_by(n - stop.len())
+    (0..measured.len()).map(rest).collect()
+}
+
+/// The straight line through some points by least squares.
+fn fit_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
+    // Means, slope and intercept.
+    let n = points.len() as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let spread = mean(&|p| (p.0 - x).powi(2));
+    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / spread;
+    (spread > 0.0).then_some(move |at: f64| y + slope * (at - x))
 }
 
 /// Contacts in the order of the recordings: close ones are joined.

@@ -531,19 +531,38 @@ mod tests {
             let moments = HypothesisRows { channels, base };
             let without = ForceChange(vec![(1, 1, 0.0)]);
             assert_eq!(
-                moments.fit_errors(&without)[1],
+                moments.fit_errors(&without).0[1],
                 None,
                 "a force of zero has no relative error"
             );
             for change in [vec![], vec![(1, 1, -1.0)], vec![(0, 2, 1.0), (2, 0, 1.0)]] {
                 let change = ForceChange(change);
                 let expected = errors_of_rows(&rows, &forces, &change);
-                let found = moments.fit_errors(&change);
+                let found = moments.fit_errors(&change).0;
                 for (found, expected) in found.iter().zip(&expected) {
                     let found = found.expect("all drives have forces");
                     assert!((found - expected).abs() < 1e-6 * expected, "{found} and {expected}");
                 }
             }
         }
+    }
+
+    /// Friction of 3 per unit of the rate, and a force of the model that has nothing to do with it; turned, the same
+    /// friction drives.
+    #[test]
+    fn friction_dissipates_unless_the_force_is_turned() {
+        let samples = 200;
+        let rows = numbers(samples, 1 + MORE, 4.2);
+        let force: Vec<f64> = (0..samples).map(|i| 5.0 * rows[(i, 0)] + 3.0 * rows[(i, 1)]).collect();
+        let rate = rows.column(1).norm();
+        let expected = 3.0 * rate * rate / (rate * DVector::from_vec(force.clone()).norm());
+        let channel = ChannelMoments::new(&rows, &[force], None).expect("numbers are finite");
+        let moments = HypothesisRows {
+            channels: vec![channel],
+            base: 1,
+        };
+        let of = |factor: f64| moments.fit_errors(&ForceChange(vec![(0, 0, factor)])).1[0].expect("a force");
+        assert!((of(1.0) - expected).abs() < 1e-4, "{} and {expected}", of(1.0));
+        assert!((of(-1.0) + expected).abs() < 1e-4, "{}", of(-1.0));
     }
 }

@@ -31,10 +31,11 @@ use super::held_out::{
 use super::options::RecordingOptions;
 use super::raised_cutoff::{ComparedBand, RaisedWindow, is_harmless};
 use super::smoother::{SmootherCandidate, series_up_to};
+use super::smoother_trials::{SmootherTrials, cost_text};
 use super::stick::StickPhases;
 use super::thresholds::{
-    DECIMATION_FEWEST_KEPT, EXTENSION_LEAST_GAIN, SAME_RATE_TOLERANCE, SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN,
-    SUITED_CUTOFF_PASSBANDS, SUITED_MOST_GROWTH, WINDOW_FEWEST_SAMPLES,
+    DECIMATION_FEWEST_KEPT, FOLLOWERS_LEAST_GAIN, SAME_RATE_TOLERANCE, SMOOTHING_LEAST_GAIN, SUITED_CUTOFF_PASSBANDS,
+    SUITED_MOST_GROWTH, WINDOW_FEWEST_SAMPLES,
 };
 use crate::error::Outcome;
 use crate::model::Model;
@@ -131,54 +132,6 @@ pub(super) fn choose_preparation(
         .into_iter()
         .filter_map(|group| SmootherSearch::new(model, reading, sticks, group)?.best_choice())
         .collect())
-}
-
-/// Smoothers of one kind that were tested, in the order of decreasing bandwidth.
-struct SmootherTrials {
-    /// Each smoother with its residual.
-    all: Vec<(SmootherCandidate, HeldOutResidual)>,
-    /// Index of the smoothest of those with nearly the smallest residual.
-    best: usize,
-}
-
-impl SmootherTrials {
-    /// The chosen smoother with its residual.
-    fn best(&self) -> (SmootherCandidate, HeldOutResidual) {
-        self.all[self.best]
-    }
-
-    /// Whether the last smoother is the best one, and clearly better than the one before: a smoother one may be better
-    /// still.
-    fn falls_to_the_end(&self) -> bool {
-        match self.all.as_slice() {
-            [.., (_, before), (_, last)] => {
-                self.best + 1 == self.all.len() && last.figure < before.figure - EXTENSION_LEAST_GAIN
-            }
-            _ => false,
-        }
-    }
-
-    /// How the residual grows with the neighbours of the best, one phrase each.
-    fn neighbours(&self) -> impl Iterator<Item = String> {
-        let beside = [self.best.checked_sub(1), Some(self.best + 1)];
-        beside.into_iter().flatten().filter_map(|at| {
-            let (smoother, other) = self.all.get(at)?;
-            let cost = cost_text(other.figure - self.best().1.figure);
-            Some(format!("{cost} at {}", smoother.frequency_text()))
-        })
-    }
-}
-
-/// The change of the residual in per cent, from the difference of two figures.
-fn cost_text(difference: f64) -> String {
-    let more = difference.exp() - 1.0;
-    if more.abs() < SAME_RESIDUAL_TOLERANCE {
-        "the same".to_owned()
-    } else if more < 0.0 {
-        format!("{} less", percent(Some(-more)))
-    } else {
-        format!("{} more", percent(Some(more)))
-    }
 }
 
 /// The search for the best smoother of some recordings with one sampling rate.
@@ -378,7 +331,7 @@ impl<'a> SmootherSearch<'a> {
         let Some(mut least) = total(best) else { return best };
         while let Some(higher) = best.checked_sub(1)
             && let Some(sum) = total(higher)
-            && sum < least - SMOOTHING_LEAST_GAIN
+            && sum < least - FOLLOWERS_LEAST_GAIN
         {
             (best, least) = (higher, sum);
         }

@@ -24,6 +24,7 @@ mod read;
 mod sensor_faults;
 mod shared_drives;
 mod smoother;
+mod smoother_trials;
 mod states;
 mod stick;
 mod table_range;

@@ -24,9 +24,17 @@ pub(super) const SMOOTHING_ROWS_PER_COLUMN: usize = 3;
 /// decimates more, and a Fourier series to be preferred to a low-pass. By judgement.
 pub(super) const SMOOTHING_LEAST_GAIN: f64 = 0.005;
 
+/// Decrease of the sum of both logarithms (1) from which validation runs raise the cut-off of the fit. A double pendulum
+/// whose validation run is three times as fast has 0.17.
+pub(super) const FOLLOWERS_LEAST_GAIN: f64 = 0.05;
+
 /// Decrease of the logarithm of the residual (1) at the lowest cut-off from which lower ones are tried. A double pendulum
 /// with vibrations has 0.15 to 0.4 at each step; recordings whose motion sets the band have 0.05 and less.
 pub(super) const EXTENSION_LEAST_GAIN: f64 = 0.1;
+
+/// Residual at the lowest cut-off (1) from which lower ones are tried: what a model explains so far is no noise. By
+/// judgement, with 0.4 on the double pendulum.
+pub(super) const EXTENSION_LEAST_RESIDUAL: f64 = 0.1;
 
 /// Residuals that differ by less than this share (1) are called equal in the note on the choice. By judgement.
 pub(super) const SAME_RESIDUAL_TOLERANCE: f64 = 1e-3;

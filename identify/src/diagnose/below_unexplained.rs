@@ -1,0 +1,71 @@
+//! Drops effects that explain less than what stays unexplained on their channels.
+
+use super::SetResidual;
+use super::bench::{EffectSelector, SelectedEffect};
+use super::pool::FitScope;
+use super::thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LARGE_RESIDUAL_SHARE};
+use crate::signal::dot;
+
+impl EffectSelector<'_> {
+    /// Drops members that explain less than what stays unexplained on their channels, the weakest first, and returns
+    /// the set with its residual. There an unknown law is as likely as the effect.
+    pub(super) fn drop_below_unexplained(
+        &mut self,
+        mut picks: Vec<SelectedEffect>,
+    ) -> (Vec<SelectedEffect>, SetResidual) {
+        loop {
+            let left = self.set_residual(&picks);
+            // Find the member whose gain is smallest relative to the unexplained squares on its channels.
+            let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
+            for i in 0..picks.len() {
+                let channels = self.affected_channels(&picks[i..=i]);
+                let repeatable = |d: usize| {
+                    if left.unexplained.contains(&d) {
+                        left.repeatable_share[d] * dot(&left.residual[d], &left.residual[d])
+                    } else {
+                        0.0
+                    }
+                };
+                let large: Option<Vec<f64>> = channels.iter().map(|d| self.large_squares(*d, &left)).collect();
+                if large.is_none() && channels.iter().all(|d| repeatable(*d) <= 0.0) {
+                    continue;
+                }
+                // Gain of the member: squares that come back when the set is fitted without it.
+                let mut fewer = picks.clone();
+                fewer.remove(i);
+                let fewer = self.refresh_columns(fewer);
+                let (factors, _) = self.fit(&fewer, FitScope::All);
+                let rest = self.residual(&fewer, &factors);
+                let gain = |d: usize| dot(&rest[d], &rest[d]) - dot(&left.residual[d], &left.residual[d]);
+                let weighted =
+                    |of: &dyn Fn(usize) -> f64| channels.iter().map(|d| self.weights[*d] * of(*d)).sum::<f64>();
+                let of_repeatable = match weighted(&repeatable) {
+                    stays if stays > 0.0 => weighted(&gain) / stays,
+                    _ => f64::INFINITY,
+                };
+                // Where all residuals are large, one channel on which the member explains more is enough.
+                let of_large = large.map_or(f64::INFINITY, |large| {
+                    let shares = channels.iter().zip(&large).map(|(d, stays)| gain(*d) / stays);
+                    shares.fold(0.0, f64::max)
+                });
+                let share = of_repeatable.min(of_large);
+                if share < EFFECT_LEAST_UNEXPLAINED_RATIO && least.as_ref().is_none_or(|(other, _)| share < *other) {
+                    least = Some((share, fewer));
+                }
+            }
+            match least {
+                Some((_, fewer)) => picks = fewer,
+                None => return (picks, left),
+            }
+        }
+    }
+
+    /// The squares of a channel beyond its noise if they are a large part of those of the force; `None` otherwise.
+    fn large_squares(&self, channel: usize, left: &SetResidual) -> Option<f64> {
+        let rest = &left.residual[channel];
+        let force = self.problem.measured_force(channel);
+        let beyond_noise = dot(rest, rest) - self.problem.noise[channel].powi(2) * rest.len() as f64;
+        let is_large = beyond_noise > LARGE_RESIDUAL_SHARE.powi(2) * dot(&force, &force);
+        (is_large && !self.problem.is_idle(channel)).then_some(beyond_noise)
+    }
+}
