@@ -43,36 +43,33 @@ def panda_model(data, folder):
     return folder / "panda-friction.toml"
 
 
-def joints(pattern, count, first=1):
-    return [pattern.format(k) for k in range(first, first + count)]
+def joints(pattern, count):
+    return [pattern.format(k) for k in range(1, count + 1)]
 
 
-# Model, recordings of the fit, validation run, columns of coordinates and of forces.
+# Model, recordings of the fit, validation run, columns of forces.
 MACHINES = {
-    "panda": (panda_model, ["panda/fit.csv"], "panda/check.csv", joints("q{}", 7), joints("joint{}", 7)),
+    "panda": (panda_model, ["panda/fit.csv"], "panda/check.csv", joints("joint{}", 7)),
     "tiago": (
         tiago_model,
         ["machines/tiago/fit.csv"],
         "machines/tiago/check.csv",
-        joints("arm{}", 4),
         joints("e_arm{}", 4),
     ),
     "double-pendulum": (
         "machines/double-pendulum/dp_A_full.toml",
         [f"machines/double-pendulum/trajectory_0{k}.csv" for k in range(4)],
         "machines/double-pendulum/trajectory_04.csv",
-        joints("pos_meas{}", 2),
         joints("tau_meas{}", 2),
     ),
-    "cloos": (MODELS / "cloos.toml", ["cloos-qrc350/traj_A.csv"], "cloos-qrc350/traj_C.csv", None, joints("tau{}_Nm", 6)),
+    "cloos": (MODELS / "cloos.toml", ["cloos-qrc350/traj_A.csv"], "cloos-qrc350/traj_C.csv", joints("tau{}_Nm", 6)),
     "kuka": (
         "kuka-kr300/kuka_full.toml",
         ["kuka-kr300/kuka_A.csv", "kuka-kr300/kuka_B.csv"],
         "kuka-kr300/kuka_C.csv",
-        joints("q{}", 6),
         joints("taum{}", 6),
     ),
-    "emps": (MODELS / "emps.toml", ["emps/emps_train.csv"], "emps/emps_pulses.csv", None, ["force_N"]),
+    "emps": (MODELS / "emps.toml", ["emps/emps_train.csv"], "emps/emps_pulses.csv", ["force_N"]),
 }
 
 
@@ -108,10 +105,12 @@ def wrong_sign(random, tables, columns, time):
 
 
 def exchanged(random, tables, columns, time):
-    a, b = random.choice(columns, 2, replace=False)
+    if len(columns) < 2:
+        return None
+    a, b = (str(name) for name in random.choice(columns, 2, replace=False))
     for table in tables:
         table[a], table[b] = table[b], table[a]
-    return {"exchanged_columns"}, None, None
+    return {"exchanged_columns"}, a, None
 
 
 def strong(random, tables, columns):
@@ -193,7 +192,7 @@ def mark_of(answer, baseline, truth, model):
     known = {(kind, at) for kind, at, *_ in claims_of(baseline)}
     claims = claims_of(answer)
     if not truth:
-        return "right" if answer["verdict"] == baseline["verdict"] else "false", claims
+        return "", claims
     kinds, column, interval = truth
     place = column and drive_of(model, column)
 
@@ -229,7 +228,7 @@ def main():
         for machine in machines:
             folder = (options.keep or pathlib.Path(temporary)) / machine
             folder.mkdir(parents=True, exist_ok=True)
-            model, fit, check, coordinates, forces = MACHINES[machine]
+            model, fit, check, forces = MACHINES[machine]
             model = model(options.data, folder) if callable(model) else pathlib.Path(options.data, model)
             paths = [options.data / name for name in [*fit, check]]
             if not all(path.is_file() for path in paths):
@@ -237,15 +236,14 @@ def main():
                 continue
             plain = [read_table(path) for path in paths]
             time = next(iter(plain[0]))
-            if forces is None:
-                names = re.findall(r'\[\[drive\]\][^\[]*?name = "(\w+)"', model.read_text())
-                forces = [name for name in names if name in plain[0]]
             baseline = None
             for fault in faults:
                 number = sum(ord(letter) for letter in machine + fault)
                 random = np.random.default_rng([options.seed, number])
                 tables = [dict(table) for table in plain]
                 truth = FAULTS[fault](random, tables, forces, time)
+                if truth is None:
+                    continue
                 arguments = []
                 for k, table in enumerate(tables):
                     path = folder / f"{fault}-{k}.csv"
@@ -255,17 +253,23 @@ def main():
                 done = subprocess.run(command, capture_output=True, text=True)
                 says = "" if not truth else f"{truth[1] or ''} {' to '.join(f'{t:.2f}' for t in truth[2] or [])}".strip()
                 if done.returncode:
-                    mark, said = "honest", "refused: " + done.stderr.strip().splitlines()[-1][:200]
+                    mark, said = "honest", "refused: " + done.stderr.strip()[-200:]
                 else:
                     answer = json.loads(done.stdout)
                     (folder / f"{fault}.json").write_text(done.stdout)
-                    baseline = baseline or answer
+                    if fault == "none":
+                        baseline = answer
                     mark, claims = mark_of(answer, baseline, truth, model)
                     said = f"{answer['verdict']} {100 * (answer['steps'][-1]['check'] or 0):.2f} %: "
                     said += "; ".join(
                         f"{kind} {','.join(at)} {' to '.join(f'{t:.2f}' for t in when or [])}".strip() for kind, at, when, _ in claims
                     )
-                if fault != "none":
+                if baseline is None:
+                    print(f"{machine}: skipped, its recordings without a fault are refused")
+                    break
+                if fault == "none":
+                    mark = "as it is"
+                else:
                     scores[mark] += 1
                 print(f"{machine:16} {fault:10} {mark:7} {says} | {said}", flush=True)
     n = max(scores.total(), 1)

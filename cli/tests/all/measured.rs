@@ -35,8 +35,8 @@ fn claimed_kinds(answer: &Value) -> Vec<String> {
         .collect()
 }
 
-/// Positions have vibrations up to 70 Hz, and the motion has 4 Hz: a low-pass that suits the band of the positions made
-/// contacts, a delay of 248 ms and the speed of a Stribeck friction of it.
+/// Positions have vibrations up to 70 Hz, and the motion has 4 Hz: with a low-pass for the band of the positions, contacts, a
+/// delay of 248 ms and a Stribeck friction were reported.
 #[test]
 fn vibrations_are_no_contacts_and_no_delay() {
     let runs = ["00", "01", "02", "03", "04"].map(|run| format!("trajectory_{run}.csv"));

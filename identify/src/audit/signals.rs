@@ -231,8 +231,7 @@ impl SignalRecording {
     }
 }
 
-/// The recorded positions of a coordinate, with its top speed: a force that is constant while all stand still is no
-/// limit of the drive.
+/// The recorded positions of a coordinate, with its top speed.
 struct PositionSignal<'a> {
     values: &'a [f64],
     /// The largest mean speed over a window of the recording, per sample.
@@ -249,10 +248,13 @@ impl<'a> PositionSignal<'a> {
         }
     }
 
-    /// Whether the coordinate moves noticeably from one sample to a later one.
+    /// Whether the coordinate moves noticeably within some samples: a force that is constant while all stand still is no
+    /// limit of the drive.
     fn moves_between(&self, first: usize, last: usize) -> bool {
-        let moved = (self.values[last] - self.values[first]).abs();
-        moved > MOVING_LEAST_SPEED_SHARE * self.top_speed * (last - first) as f64
+        let within = &self.values[first..=last];
+        let low = within.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = within.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        high - low > MOVING_LEAST_SPEED_SHARE * self.top_speed * (last - first) as f64
     }
 }
 
@@ -355,7 +357,7 @@ mod tests {
             ),
             none
         );
-        // So may it be if the encoder has noise: a hand moves a pendulum, and holds it.
+        // So it may be if the encoder has noise: a hand moves a pendulum, and holds it.
         assert_eq!(
             says(
                 |t| (3.0 * t).min(2.4) + 1e-4 * (9e4 * t).sin(),

@@ -7,8 +7,9 @@ use super::thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LARGE_RESIDUAL_SHARE};
 use crate::signal::dot;
 
 impl EffectSelector<'_> {
-    /// Drops members that explain less than what stays unexplained on their channels, the weakest first, and returns
-    /// the set with its residual. There an unknown law is as likely as the effect.
+    /// Drops members that explain less than what stays unexplained, the weakest first, and returns the set with its
+    /// residual: there an unknown law is as likely as the effect. Two rules hold. The gains on all channels are compared with
+    /// the repeatable squares. Where all residuals are large, one channel must gain more than the squares that stay there.
     pub(super) fn drop_below_unexplained(
         &mut self,
         mut picks: Vec<SelectedEffect>,
@@ -19,6 +20,9 @@ impl EffectSelector<'_> {
             let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
                 let channels = self.affected_channels(&picks[i..=i]);
+                if channels.is_empty() {
+                    continue;
+                }
                 let repeatable = |d: usize| {
                     if left.unexplained.contains(&d) {
                         left.repeatable_share[d] * dot(&left.residual[d], &left.residual[d])

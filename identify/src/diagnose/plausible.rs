@@ -178,8 +178,8 @@ struct FrictionChange {
 }
 
 impl FrictionChange {
-    /// Whether the change turns friction into a force that drives: at the start or the end of the recording half of it
-    /// is missing. `levels` are viscous and dry friction in the middle, where they are known.
+    /// Whether the change turns friction into a force that drives: half of the change is missing at the start or at the end
+    /// of the recording. `levels` are viscous and dry friction in the middle, where they are known.
     fn turns_negative(&self, levels: &[Option<f64>; 2]) -> bool {
         let [viscous, dry] = *levels;
         let slack = |level: f64| PLAUSIBLE_MOST_FRICTION_CHANGE * level.max(0.0);

@@ -93,8 +93,8 @@ pub(super) const PLAUSIBLE_MOST_FORCE_RATIO: f64 = 5.0;
 pub(super) const PLAUSIBLE_MOST_FRICTION_CHANGE: f64 = 1.1;
 
 /// A column of the model has the shape of friction if less than this share of its squares is left (1): decimation smooths
-/// the switch of dry friction, which leaves 0.07 on a fast pendulum; the rate leaves 0.5 of a switch.
-pub(super) const SAME_SHAPE_MOST_REST: f64 = 0.2;
+/// the switch of dry friction, which leaves 0.07 on a fast pendulum; a sinusoidal rate leaves 0.19 of a switch.
+pub(super) const SAME_SHAPE_MOST_REST: f64 = 0.12;
 
 /// Largest plausible error of a length, as a part of the largest distance of two frames (1). By judgement.
 pub(super) const PLAUSIBLE_MOST_LENGTH_SHARE: f64 = 0.3;
@@ -386,10 +386,12 @@ pub(super) const SIMPLER_CHANGE_SHARE: f64 = 0.9;
 /// lower the rest by a few percent, the inertia of a heavy load by half.
 pub(super) const GENERAL_CHANGE_REST: f64 = 0.7;
 
-/// A drive that is slower than this share of its top speed (1) hardly moves: a change of its signal is not believed if it
-/// moves faster for less than the second share (1) of the time with the change, or of the time without it. The KUKA KR300
-/// creeps for 2 s before its motion.
+/// A drive that is slower than this share of its top speed (1) hardly moves. The KUKA KR300 creeps for 2 s before its
+/// motion.
 pub(super) const SLOW_RATE_SHARE: f64 = 0.05;
+
+/// A change of a signal is believed only if its drive moves for this share of the time (1), with the change and without it.
+/// By judgement.
 pub(super) const MOVING_LEAST_SHARE: f64 = 0.2;
 
 // --- verdict

@@ -222,7 +222,8 @@ pub(super) const GROUP_LEAST_OVERLAP: f64 = 0.7;
 /// An event of a single drive exceeds this share of its rms force (1).
 pub(super) const ALONE_LEAST_FORCE_SHARE: f64 = 0.03;
 
-/// It stands out by this factor (1): wrists of the Panda have residuals of friction of 8 to 9.5.
+/// An event of a single drive in motion stands out by this factor (1), unless it is large: wrists of the Panda have
+/// residuals of friction of 8 to 9.5.
 pub(super) const ALONE_LEAST_DEVIATIONS: f64 = 10.0;
 
 /// Share of the samples of an event of a single drive that may show no contact (1), unless it is large: the KUKA KR300

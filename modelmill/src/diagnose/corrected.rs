@@ -9,9 +9,7 @@ use std::sync::Arc;
 use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance};
 
 use crate::error::{Error, Outcome};
-use crate::faults::{
-    ColumnOperation, CorrectionScore, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score,
-};
+use crate::faults::{ColumnOperation, FaultCorrection, RecordingFaultKind, SuspectedFault, correction_score};
 use crate::model::Model;
 use crate::progress::SilentProgress;
 use crate::recording::{PreparedRecording, UnpreparedRecording};
@@ -49,7 +47,8 @@ impl CorrectedRecordings {
     ) -> Outcome<Option<Self>> {
         let each: Vec<&PreparedRecording> = fit.iter().chain(check).copied().collect();
         let has_fault = each.iter().any(|one| one.suspected_fault().is_some());
-        if !has_fault && PreparedRecording::find_common_fault(model, &each).is_none() {
+        let mut common = PreparedRecording::find_common_fault(model, &each);
+        if !has_fault && common.is_none() {
             return Ok(None);
         }
         let copies = |all: &[&PreparedRecording]| all.iter().map(|one| (*one).clone()).collect();
@@ -63,7 +62,9 @@ impl CorrectedRecordings {
         };
         // Several faults may be present, and one may hide another.
         for _ in 0..CORRECTION_ROUNDS {
-            let Some(fault) = all.next_fault() else { break };
+            let Some(fault) = common.take().or_else(|| all.next_fault()) else {
+                break;
+            };
             let Some(correction) = fault.correction.clone() else {
                 break;
             };
@@ -103,8 +104,8 @@ impl CorrectedRecordings {
         Ok(Some(all))
     }
 
-    /// The first fault that is found, with all recordings that have it: a sign or an exchange that all have, before others. One that several faults explain comes first,
-    /// since nothing can be corrected then.
+    /// The first fault that is found, with all recordings that have it. A sign or an exchange that all have comes first, then
+    /// a fault that several hypotheses explain, since nothing can be corrected then.
     fn next_fault(&self) -> Option<SuspectedFault> {
         let each: Vec<&PreparedRecording> = self.fit.iter().chain(&self.check).collect();
         if let Some(common) = PreparedRecording::find_common_fault(&self.model, &each) {
@@ -155,6 +156,7 @@ impl CorrectedRecordings {
     /// Fails when the job is cancelled.
     fn correct_columns(&mut self, mut fault: SuspectedFault, operations: &[ColumnOperation]) -> Outcome<bool> {
         let mut all: Vec<PreparedRecording> = self.fit.iter().chain(&self.check).cloned().collect();
+        let all_have_it = fault.recordings.len() == all.len();
         for one in &mut all {
             let has_it = fault.recordings.iter().any(|file| file == one.file());
             if !has_it && one.suspected_fault().is_some() {
@@ -167,16 +169,22 @@ impl CorrectedRecordings {
                 Err(_) if has_it => return Ok(false),
                 Err(_) => continue,
             };
-            if !has_it {
+            if !has_it || all_have_it {
                 let score = correction_score((&self.model, &one.segments), (&self.model, &corrected.segments));
+                let gain = score.as_ref().map_or(0.0, |score| score.gain);
                 let is_sign = fault.kind == RecordingFaultKind::WrongSign;
-                let has_it_too = |score: &CorrectionScore| {
-                    score.gain > SHARED_FAULT_LEAST_SCORE || is_sign && score.is_asked_by_friction
-                };
-                if !score.as_ref().is_some_and(has_it_too) {
+                let is_asked = is_sign && score.is_some_and(|score| score.is_asked_by_friction);
+                // One fit to all recordings may find a fault that one of them does not have.
+                if has_it && gain < -SHARED_FAULT_LEAST_SCORE && !is_asked {
+                    fault.recordings.retain(|file| file != one.file());
                     continue;
                 }
-                fault.recordings.push(one.file().to_owned());
+                if !has_it && gain <= SHARED_FAULT_LEAST_SCORE && !is_asked {
+                    continue;
+                }
+                if !has_it {
+                    fault.recordings.push(one.file().to_owned());
+                }
             }
             *one = corrected;
         }
@@ -191,13 +199,18 @@ impl CorrectedRecordings {
     /// Takes corrected recordings, those of the fit first, and prepares them again with common choices: those of the
     /// recordings with the fault mean nothing.
     ///
-    /// Fails when a recording cannot be prepared, or when the job is cancelled.
+    /// Fails when the job is cancelled.
     fn prepare_together(&mut self, all: &[PreparedRecording]) -> Outcome<()> {
         let sources: Vec<UnpreparedRecording> = all.iter().map(PreparedRecording::before_preparation).collect();
         let silent = self.model.host().clone().with_progress(Arc::new(SilentProgress));
         let silent = self.model.clone().with_host(&silent);
         let prepared = PreparedRecording::new_together(&silent, &sources, self.fit.len());
-        let mut prepared: Vec<PreparedRecording> = prepared.into_iter().collect::<Outcome<_>>()?;
+        let mut prepared = match prepared.into_iter().collect::<Outcome<Vec<_>>>() {
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            // Then each keeps its own choices.
+            Err(_) => all.to_vec(),
+            Ok(prepared) => prepared,
+        };
         self.check = prepared.split_off(self.fit.len());
         self.fit = prepared;
         Ok(())

@@ -89,7 +89,7 @@ fn offset_drift(one: &Disturbance, at: &str) -> String {
     if clear().any(|q| is_change(&q)) {
         let all = values_of(clear(), offset_name);
         format!("the zero of the measured force of {at} drifts with time: {all}")
-    } else if clear().next().is_some() {
+    } else if clear().next().is_some() && one.estimates.iter().filter(is_change).count() > 1 {
         let all = values_of(clear(), |name| name.strip_prefix("F0 ").unwrap_or(name).to_owned());
         format!("the zero of the measured force of {at} differs between the recordings: {all}")
     } else {

@@ -308,9 +308,7 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
     let falls = error_reduction_text(first, last, channels, judged);
     // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
-        DiagnosisVerdict::Unexplained
-            if found.is_empty() && is_all_explained(diagnosis) && diagnosis.is_hidden_by_noise() =>
-        {
+        DiagnosisVerdict::Unexplained if is_only_hidden_by_noise(diagnosis) => {
             format!(
                 "{} Smaller effects are hidden by the noise: record larger and faster motions, or a better signal of the force.",
                 explained_text(
@@ -515,6 +513,11 @@ pub(crate) fn time_residual(one: &TimeResidual, channel: &str, unit: &str) -> St
              Repeat the motion to see what is noise"
         ),
     }
+}
+
+/// Whether the noise is the only reason why a model is not called adequate.
+pub(crate) fn is_only_hidden_by_noise(diagnosis: &ModelDiagnosis) -> bool {
+    diagnosis.effects.is_empty() && is_all_explained(diagnosis) && diagnosis.is_hidden_by_noise()
 }
 
 /// Whether the residual is noise everywhere, and nothing changes within a recording.

@@ -52,7 +52,8 @@ impl JudgedHypothesis {
     }
 
     /// Whether friction decides, which brakes a machine whatever its model: with the signs as they are recorded it would
-    /// drive some drives, and with the other signs it brakes all of them. The fit must agree, unless all forces turn.
+    /// drive some drives, and with the other signs it brakes them and drives no others. The fit must agree, unless the
+    /// forces of two or more drives turn together. A single drive has no fit that could agree.
     fn is_decided_by_friction(&self, before: &HypothesisErrors) -> bool {
         if self.hypothesis.kind != RecordingFaultKind::WrongSign {
             return false;

@@ -36,7 +36,7 @@ use crate::text::names::joined_by_and;
 use bench::FaultBench;
 pub(crate) use correction::{ColumnOperation, FaultCorrection};
 use correction::{ForceChange, MotionChange};
-pub(crate) use judge::{CorrectionScore, correction_score, find_fault};
+pub(crate) use judge::{correction_score, find_fault};
 pub(crate) use silent::{SilentInterval, silent_intervals};
 
 /// Kinds of faults of recordings.

@@ -140,7 +140,7 @@ struct SmootherSearch<'a> {
     model: &'a Model,
     /// The recordings.
     recordings: Vec<OpenRecording<'a>>,
-    /// Recordings that get the same choice and do not decide.
+    /// Recordings that get the same choice. They decide only whether a higher cut-off is needed.
     followers: Vec<OpenRecording<'a>>,
     /// The options of the user.
     reading: &'a RecordingOptions,
@@ -152,7 +152,7 @@ struct SmootherSearch<'a> {
 
 impl<'a> SmootherSearch<'a> {
     /// The search for a group of recordings: those of the fit decide if there are any, and the fastest of their motions
-    /// determines the band. `None` without recordings.
+    /// determines the band. The others may raise the cut-off. `None` without recordings.
     fn new(
         model: &'a Model,
         reading: &'a RecordingOptions,
@@ -200,7 +200,9 @@ impl<'a> SmootherSearch<'a> {
             ladder.push(ladder[ladder.len() - 1] / RATIO);
         }
         let (looked_at, mut filtered) = self.try_low_passes(ladder)?;
+        let best_of_fit = filtered.best;
         filtered.best = self.raised_for_followers(&filtered);
+        let is_raised = filtered.best < best_of_fit;
         let series = period.and_then(|period| {
             let ladder = series_up_to(filtered.best().0.cutoff, period);
             self.try_smoothers(&ladder, &looked_at)
@@ -238,7 +240,7 @@ impl<'a> SmootherSearch<'a> {
         });
         // The note states how the residual changes with the alternatives.
         let others: Vec<String> = tried.neighbours().chain(other).collect();
-        let says = self.choice_text(smoother, decimate, left, &others.join(", "));
+        let says = self.choice_text(smoother, decimate, left, &others.join(", "), is_raised);
         Some(PreparationChoice {
             readings: readings.collect(),
             note: RecordingNote::info(says),
@@ -252,7 +254,13 @@ impl<'a> SmootherSearch<'a> {
         decimate: usize,
         left: HeldOutResidual,
         others: &str,
+        is_raised: bool,
     ) -> Message {
+        let raised = if is_raised {
+            " It was raised for the validation runs, whose motion is faster."
+        } else {
+            ""
+        };
         let every = if decimate > 1 {
             format!(", and decimated by {decimate} after a low-pass on forces and regressor")
         } else {
@@ -271,7 +279,7 @@ impl<'a> SmootherSearch<'a> {
         };
         message!(
             "{what}{every}. This was chosen automatically by cross-validation: it smooths most among those whose error on held-out \
-             parts of the run is close to the smallest. Its error there is {} of the force (below {} Hz, geometric mean over the \
+             parts of the run is close to the smallest.{raised} Its error there is {} of the force (below {} Hz, geometric mean over the \
              drives).{others} Set it yourself with {}, {} and {}.",
             percent(Some(left.relative)),
             significant(self.open.band_hz, 3),
@@ -310,6 +318,9 @@ impl<'a> SmootherSearch<'a> {
     /// residual of the other recordings falls by more than that of the fit rises. Their motion may be faster.
     fn raised_for_followers(&self, trials: &SmootherTrials) -> usize {
         let mut best = trials.best;
+        if self.followers.is_empty() || best == 0 {
+            return best;
+        }
         let followers = Self {
             recordings: self.followers.clone(),
             followers: Vec::new(),

@@ -34,6 +34,8 @@ pub struct PreparedRecording {
     /// The suspected fault whose correction brings recording and model into the best agreement; `None` if no fault is
     /// decisive.
     suspect: Option<SuspectedFault>,
+    /// By how much a delay of the forces explains it better: see [`ForceDelayAudit::log_gain`].
+    delay_gain: f64,
     /// Intervals in which drives stick.
     sticks: RecordingSticks,
 }
@@ -151,6 +153,7 @@ impl PreparedRecording {
             reading,
             source: source.clone(),
             suspect: None,
+            delay_gain: 0.0,
             sticks: choice.sticks,
         })
     }
@@ -162,8 +165,22 @@ impl PreparedRecording {
         let segments: Vec<RecordingSegment> = all.iter().flat_map(|one| one.segments.iter().cloned()).collect();
         let mut fault = find_fault(&first.fault_subject(model, &segments))?;
         let is_common = [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
+        let delay_gain = all.iter().map(|one| one.delay_gain).fold(0.0, f64::max);
+        let is_believed = || all.iter().all(|one| one.is_believed(model, &fault, delay_gain));
+        if !is_common || !fault.is_correctable() || !is_believed() {
+            return None;
+        }
         fault.recordings = all.iter().map(|one| one.file().to_owned()).collect();
-        (is_common && fault.is_correctable()).then_some(fault)
+        Some(fault)
+    }
+
+    /// Whether nothing else explains a fault: neither a delay of the forces, with the gain of [`ForceDelayAudit`], nor gears.
+    fn is_believed(&self, model: &Model, fault: &SuspectedFault, delay_gain: f64) -> bool {
+        // Forces that are delayed by a large part of a period resemble those of another drive, or of another sign.
+        let may_be_delay = [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
+        let is_delay = may_be_delay && delay_gain >= DELAY_LEAST_SHARE_OF_GAIN * fault.fit_gain.max(1.0);
+        // Forces before a gear have a sign beside their factor, which the note on the gear states for each drive.
+        !is_delay && !self.is_sign_of_gears(model, fault)
     }
 
     /// What the search for faults sees of this recording, with segments of it or of all recordings.
@@ -184,25 +201,12 @@ impl PreparedRecording {
         let suspect = find_fault(&self.fault_subject(model, &self.segments));
         let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
         let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
-        // Forces that are delayed by a large part of a period resemble those of another drive, or of another sign.
-        let delay_gain = delays
+        self.delay_gain = delays
             .iter()
             .flatten()
             .map(ForceDelayAudit::log_gain)
             .fold(0.0, f64::max);
-        self.suspect = suspect.filter(|fault| {
-            let may_be_delay =
-                [RecordingFaultKind::ExchangedColumns, RecordingFaultKind::WrongSign].contains(&fault.kind);
-            !may_be_delay || delay_gain < DELAY_LEAST_SHARE_OF_GAIN * fault.fit_gain.max(1.0)
-        });
-        // Forces before a gear have a sign beside their factor, which the note on the gear states for each drive.
-        if self
-            .suspect
-            .as_ref()
-            .is_some_and(|fault| self.is_sign_of_gears(model, fault))
-        {
-            self.suspect = None;
-        }
+        self.suspect = suspect.filter(|fault| self.is_believed(model, fault, self.delay_gain));
         if let (Some(fault), Some(first)) = (&self.suspect, self.segments.first_mut()) {
             first.note(model, RecordingNote::warning(fault.note_text()));
             first.faults.push(fault.disturbance());
@@ -266,6 +270,7 @@ impl PreparedRecording {
             reading: self.reading.clone(),
             source: self.source.clone(),
             suspect: self.suspect.clone(),
+            delay_gain: self.delay_gain,
             sticks: self.sticks.clone(),
         }
     }

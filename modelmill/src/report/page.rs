@@ -101,7 +101,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
         DiagnosisVerdict::Unexplained if words::has_only_changes_in_time(diagnosis) => {
             ("unexplained", "a change during a recording explains the error")
         }
-        DiagnosisVerdict::Unexplained if diagnosis.is_hidden_by_noise() => {
+        DiagnosisVerdict::Unexplained if words::is_only_hidden_by_noise(diagnosis) => {
             ("unexplained", "noise hides what may be missing")
         }
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),

@@ -207,8 +207,8 @@ fn find_change(
     })
 }
 
-/// Whether the drive of a changed signal stands for nearly all of the time with the change, or for nearly all of the time
-/// without it: friction takes any value at standstill, which looks like another zero. `recording` and `changed` are samples.
+/// Whether the drive of a changed signal hardly moves during the time with the change, or during the time without it:
+/// friction takes any value at standstill, which looks like another zero. `recording` and `changed` are samples.
 fn is_signal_at_standstill(
     problem: &DiagnosisProblem,
     shape: &ChangeShape,
