@@ -173,9 +173,10 @@ impl CorrectedRecordings {
                 let score = correction_score((&self.model, &one.segments), (&self.model, &corrected.segments));
                 let gain = score.as_ref().map_or(0.0, |score| score.gain);
                 let is_sign = fault.kind == RecordingFaultKind::WrongSign;
-                let is_asked = is_sign && score.is_some_and(|score| score.is_asked_by_friction);
+                let is_asked = is_sign && score.as_ref().is_some_and(|score| score.is_asked_by_friction);
+                let is_refused = !is_sign || score.is_some_and(|score| score.is_refused_by_friction);
                 // One fit to all recordings may find a fault that one of them does not have.
-                if has_it && gain < -SHARED_FAULT_LEAST_SCORE && !is_asked {
+                if has_it && gain < -SHARED_FAULT_LEAST_SCORE && is_refused {
                     fault.recordings.retain(|file| file != one.file());
                     continue;
                 }

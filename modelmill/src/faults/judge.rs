@@ -178,6 +178,8 @@ pub(crate) struct CorrectionScore {
     pub(crate) gain: f64,
     /// Whether friction brakes the machine with the correction and would drive it without, at about the same fit.
     pub(crate) is_asked_by_friction: bool,
+    /// Whether friction would drive the machine with the correction and brakes it without.
+    pub(crate) is_refused_by_friction: bool,
 }
 
 /// What a correction does to a recording; `None` if the errors cannot be compared. Both states have a model, since gravity
@@ -197,6 +199,7 @@ pub(crate) fn correction_score(
     let gain = after.fit_gain(&before) + after.nominal_gain(&before);
     Some(CorrectionScore {
         gain,
+        is_refused_by_friction: before.drives_braked_instead(&after) > 0,
         is_asked_by_friction: after.drives_braked_instead(&before) > 0 && gain > -FIT_LOSS_TOLERANCE,
     })
 }
