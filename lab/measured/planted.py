@@ -153,7 +153,7 @@ def dead(random, tables, columns, time):
     column = strong(random, tables, columns)
     table = tables[0]
     table[column] = np.where(table[time] > 0.5 * (table[time][0] + table[time][-1]), 0.0, table[column])
-    return {"dead_channel", "frozen_signal"}, column, None
+    return {"dead_channel"}, column, None
 
 
 def late(random, tables, columns, time):
@@ -199,7 +199,8 @@ def mark_of(answer, baseline, truth, model):
     def names_it(claim):
         kind, at, when, one = claim
         kinds_of = {kind} | {other["kind"] for other in one.get("indistinguishable_from", [])}
-        in_time = not interval or (when and when[0] < interval[1] + 0.1 and when[1] > interval[0] - 0.1)
+        # A push begins and ends with little force.
+        in_time = not interval or (when and interval[0] - 0.1 < when[0] and when[1] < interval[1] + 0.1)
         return bool(kinds & kinds_of) and (place is None or place in at or not at) and in_time
 
     others = [claim for claim in claims if not names_it(claim) and claim[:2] not in known]

@@ -6,8 +6,8 @@ use modelmill_boundary::text::Message;
 use super::bench::{FaultBench, HypothesisErrors, HypothesisRows};
 use super::thresholds::{
     EQUIVALENT_ERROR_TOLERANCE, FIT_GAIN_DECISIVE, FIT_LOSS_TOLERANCE, FIT_MOST_RATIO, FRICTION_LEAST_FIT_GAIN,
-    LEAST_DISSIPATION, MOTION_LEAST_ERROR, MOTION_LEAST_NOMINAL_ERROR, NOMINAL_AFTER_MOST, NOMINAL_BEFORE_LEAST,
-    NOMINAL_GAIN_DECISIVE, NOMINAL_LOSS_TOLERANCE, RIVAL_MARGIN, SIGN_RIVAL_MARGIN,
+    MOTION_LEAST_ERROR, MOTION_LEAST_NOMINAL_ERROR, NOMINAL_AFTER_MOST, NOMINAL_BEFORE_LEAST, NOMINAL_GAIN_DECISIVE,
+    NOMINAL_LOSS_TOLERANCE, RIVAL_MARGIN, SIGN_RIVAL_MARGIN,
 };
 use super::{
     ENTRIES, FaultCorrection, FaultHypothesis, FaultSubject, ForceChange, MotionChange, RecordingFaultKind,
@@ -58,25 +58,14 @@ impl JudgedHypothesis {
         if self.hypothesis.kind != RecordingFaultKind::WrongSign {
             return false;
         }
-        let (before, after) = (&before.dissipation, &self.errors.dissipation);
-        let pairs = || {
-            before
-                .iter()
-                .zip(after)
-                .filter_map(|(before, after)| Some(((*before)?, (*after)?)))
-        };
-        let is_turned = |(before, after): (f64, f64)| before < -LEAST_DISSIPATION && after > LEAST_DISSIPATION;
-        let stays = |(before, after): (f64, f64)| after > before.min(LEAST_DISSIPATION) - LEAST_DISSIPATION;
-        let turns_all = pairs().count() > 1 && pairs().all(is_turned);
+        let turned = self.errors.drives_braked_instead(before);
+        let turns_all = turned > 1 && turned == before.dissipation.len();
         let least_gain = if turns_all {
             -FIT_LOSS_TOLERANCE
         } else {
             FRICTION_LEAST_FIT_GAIN
         };
-        pairs().any(is_turned)
-            && pairs().all(|pair| is_turned(pair) || stays(pair))
-            && self.fit_gain > least_gain
-            && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
+        turned > 0 && self.fit_gain > least_gain && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
     }
 
     /// Whether the nominal values decide, as they must for a sign or a unit that a fit absorbs.
@@ -139,7 +128,8 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
         return Some(fault);
     }
     let best = decisive.first()?;
-    let margin = if best.is_decided_by_friction(&before) {
+    let is_by_friction = best.is_decided_by_friction(&before);
+    let margin = if is_by_friction {
         SIGN_RIVAL_MARGIN
     } else {
         RIVAL_MARGIN
@@ -149,7 +139,11 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
         .filter(|one| one.score() > best.score() - margin)
         .collect();
     let is_unique = rivals.iter().all(|one| one.is_equivalent(best));
-    let evidence = evidence_text(&before, &best.errors, rows.is_some());
+    let evidence = if is_by_friction {
+        friction_evidence_text(&before, &best.errors)
+    } else {
+        evidence_text(&before, &best.errors, rows.is_some())
+    };
     let correction = is_unique.then(|| FaultCorrection::Columns(best.hypothesis.operations.clone()));
     let (clause, advice, at) = if rivals.is_empty() {
         (
@@ -302,6 +296,16 @@ pub(super) fn evidence_text(before: &HypothesisErrors, after: &HypothesisErrors,
         "{of} has an error of {} as recorded, and of {} after the correction (geometric mean over the drives).",
         percent(Some(before)),
         percent(Some(after))
+    )
+}
+
+/// The direction of friction and the errors of the fit before and after a correction, as a sentence.
+fn friction_evidence_text(before: &HypothesisErrors, after: &HypothesisErrors) -> String {
+    format!(
+        "As recorded, friction would drive the machine; after the correction it brakes it, as it must. The best fit of the \
+         model has an error of {} as recorded, and of {} after the correction (geometric mean over the drives).",
+        percent(Some(before.mean_fit())),
+        percent(Some(after.mean_fit()))
     )
 }
 
