@@ -30,6 +30,7 @@
 //! `thresholds` contains the decision thresholds.
 
 pub(crate) mod added_effects;
+mod alternative_words;
 mod candidates;
 mod clock;
 mod columns;
