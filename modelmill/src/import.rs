@@ -26,7 +26,7 @@ pub struct ImportedRobot {
 impl Host {
     /// Makes a model file from the text of a URDF, MJCF or SDF. Links behind fixed joints are merged with the body
     /// that carries them, and every body gets its ten linear parameters. `name` is the name of the file in messages;
-    /// if it is a path, files that an MJCF includes and files of its meshes are read from the same folder.
+    /// if it is a path, files that an MJCF includes or attaches and files of its meshes are read from the same folder.
     ///
     /// Fails when the text is none of these formats, or describes something that a model file cannot express.
     ///
@@ -46,7 +46,7 @@ impl Host {
             let text = self.files().read_text(&path, LARGEST_DESCRIPTION);
             text.map_err(|error| format!("{} cannot be read: {}", path.display(), error.fault))
         };
-        let text = modelmill_reduction::expand_includes(text, &read)
+        let text = modelmill_reduction::expand_other_files(text, &read)
             .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
         let read_mesh = |file: &str| self.read_mesh(Path::new(name), file);
         let options = Options {

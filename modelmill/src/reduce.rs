@@ -171,7 +171,7 @@ impl Host {
         };
         let text = read(path).map_err(Error::input)?;
         let read_included = |file: &str| read(&path.with_file_name(file));
-        let text = modelmill_reduction::expand_includes(&text, &read_included).map_err(refuse)?;
+        let text = modelmill_reduction::expand_other_files(&text, &read_included).map_err(refuse)?;
         let read_mesh = |file: &str| self.read_mesh(path, file);
         let options = ImportOptions {
             meshes: Some(MeshFiles(&read_mesh)),

@@ -33,8 +33,8 @@ mod write;
 
 pub use export::{DescriptionExport, DescriptionFormat as ExportFormat, ExportError, export};
 pub use import::{
-    DescriptionImport, DescriptionRig, ImportError, ImportedJoint, LARGEST_DESCRIPTION, LARGEST_MESH, MeshFiles,
-    Options as ImportOptions, expand_includes, import, rig_of_description,
+    DescriptionImport, DescriptionRig, FileReader, ImportError, ImportedJoint, LARGEST_DESCRIPTION, LARGEST_MESH,
+    MeshFiles, Options as ImportOptions, expand_other_files, import, rig_of_description,
 };
 pub use plan::{ReductionPlan, plan, plan_file, plan_file_with};
 pub use plan_for::default_plan;

@@ -3,7 +3,6 @@
 //! Source of names and defaults: MuJoCo's XML reference (mujoco.readthedocs.io/en/stable/XMLreference.html).
 
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
@@ -12,37 +11,16 @@ use super::description::{
     DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::geoms::{self, GIVE_INERTIAL};
+use super::mjcf_compiler::{CompilerSettings, MjcfCompiler};
 use super::mjcf_defaults::MjcfDefaults;
-use super::mjcf_meshes::{LoadedMeshes, MeshFiles, MeshFolder};
+use super::mjcf_meshes::{LoadedMeshes, MeshFiles};
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
 use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
-/// Settings of `<compiler>`, with MuJoCo's defaults.
-struct MjcfCompiler {
-    /// Whether angles are in degrees.
-    is_degree: bool,
-    /// Sequence of rotations of Euler angles; capitals rotate about fixed axes.
-    euler: String,
-    /// Whether a range is a limit if `limited` is not specified.
-    has_auto_limits: bool,
-    /// Whether inertia is computed from shapes: always, never, or (none) if there is no `<inertial>`.
-    from_geoms: Option<bool>,
-    /// Lower bound of each mass, kg.
-    least_mass: f64,
-    /// Lower bound of each principal moment, kg m^2.
-    least_inertia: f64,
-    /// Whether impossible principal moments are replaced by their mean.
-    balances_inertia: bool,
-    /// First and last group of shapes that have mass.
-    groups: [f64; 2],
-    /// Total mass to which all bodies are scaled, kg.
-    total_mass: Option<f64>,
-}
-
 /// The state of the reader: settings, defaults, and the description so far.
 pub(super) struct MjcfReader<'a> {
-    /// Settings of the file.
-    compiler: MjcfCompiler,
+    /// Settings of the file and of attached models.
+    settings: CompilerSettings<'a>,
     /// Default classes.
     defaults: MjcfDefaults<'a>,
     /// The description.
@@ -57,8 +35,6 @@ pub(super) struct MjcfReader<'a> {
     pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
     /// Reads files of meshes; `None` if the description is not a file.
     pub(super) mesh_files: Option<MeshFiles<'a>>,
-    /// Where files of meshes are.
-    pub(super) mesh_folder: MeshFolder,
     /// Meshes that were read.
     pub(super) loaded_meshes: LoadedMeshes,
 }
@@ -76,7 +52,7 @@ struct MjcfContext<'a> {
 pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>) -> Result<RobotDescription, String> {
     let root = document.root_element();
     let mut reader = MjcfReader {
-        compiler: compiler(&root)?,
+        settings: CompilerSettings::read(&root)?,
         defaults: MjcfDefaults::read(&root)?,
         out: RobotDescription {
             name: root.attribute("model").unwrap_or("robot").to_owned(),
@@ -89,7 +65,6 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
         mocap_links: Vec::new(),
         sites: Vec::new(),
         mesh_files,
-        mesh_folder: MeshFolder::read(&root),
         loaded_meshes: LoadedMeshes::new(),
     };
     // Options: gravity, and forces that the model does not have.
@@ -115,13 +90,13 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
     // Elements that MuJoCo expands when it reads the file; only their result could be imported.
     for node in root.descendants() {
         let tag = node.tag_name().name();
-        if tag == "include" {
+        if ["include", "attach"].contains(&tag) {
             return Err(located_message(
                 &node,
-                "included files can only be read if the description is given as a file",
+                "other files can only be read if the description is given as a file",
             ));
         }
-        if ["attach", "replicate", "composite", "flexcomp"].contains(&tag) {
+        if ["replicate", "composite", "flexcomp"].contains(&tag) {
             return Err(located_message(
                 &node,
                 "this element is not expanded here; save the complete model with MuJoCo (mj_saveLastXML) and import that file",
@@ -148,79 +123,10 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
     Ok(reader.out)
 }
 
-/// Reads all `<compiler>` elements; later ones replace earlier settings.
-fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
-    let mut out = MjcfCompiler {
-        is_degree: true,
-        euler: "xyz".to_owned(),
-        has_auto_limits: true,
-        from_geoms: None,
-        least_mass: 0.0,
-        least_inertia: 0.0,
-        balances_inertia: false,
-        groups: [0.0, f64::INFINITY],
-        total_mass: None,
-    };
-    for node in children(root, "compiler") {
-        if let Some(angle) = node.attribute("angle") {
-            out.is_degree = angle != "radian";
-        }
-        if let Some(sequence) = node.attribute("eulerseq") {
-            // Capitals rotate about fixed axes; the two kinds cannot be mixed.
-            let is_fine = sequence.len() == 3
-                && sequence.chars().all(|c| "xyzXYZ".contains(c))
-                && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
-            if !is_fine {
-                return Err(located_message(&node, "expected three of x, y and z in `eulerseq`"));
-            }
-            sequence.clone_into(&mut out.euler);
-        }
-        if let Some(auto) = node.attribute("autolimits") {
-            out.has_auto_limits = auto != "false";
-        }
-        match node.attribute("inertiafromgeom") {
-            Some("true") => out.from_geoms = Some(true),
-            Some("false") => out.from_geoms = Some(false),
-            _ => {}
-        }
-        for (key, value) in [
-            ("boundmass", &mut out.least_mass),
-            ("boundinertia", &mut out.least_inertia),
-        ] {
-            if let Some(text) = node.attribute(key) {
-                [*value] = exact_numbers(&node, key, text)?;
-            }
-        }
-        // Poses relative to the world have another meaning, so the file cannot be read.
-        if node.attribute("coordinate") == Some("global") {
-            return Err(located_message(
-                &node,
-                "global coordinates were removed from MuJoCo in version 2.3.3; convert the file with an older version",
-            ));
-        }
-        if let Some(balance) = node.attribute("balanceinertia") {
-            out.balances_inertia = balance == "true";
-        }
-        if let Some(text) = node.attribute("inertiagrouprange") {
-            out.groups = exact_numbers(&node, "inertiagrouprange", text)?;
-        }
-        if let Some(text) = node.attribute("settotalmass") {
-            let [total] = exact_numbers(&node, "settotalmass", text)?;
-            // The default of MuJoCo is -1, which means "no scaling".
-            out.total_mass = (total > 0.0).then_some(total);
-        }
-    }
-    Ok(out)
-}
-
 impl<'a> MjcfReader<'a> {
-    /// An angle of the file in rad.
-    fn angle(&self, value: f64) -> f64 {
-        if self.compiler.is_degree {
-            value * PI / 180.0
-        } else {
-            value
-        }
+    /// The settings of the file to which an element belongs.
+    pub(super) fn settings_of(&self, node: &Node) -> &MjcfCompiler {
+        self.settings.of(node)
     }
 
     /// An attribute of an element, its own or that of its default class.
@@ -257,6 +163,7 @@ impl<'a> MjcfReader<'a> {
     /// Position and orientation of an element, from any of the ways in which MJCF specifies an orientation.
     fn read_placement(&self, node: &Node<'a, '_>, class: Option<&str>) -> Result<DescriptionPose, String> {
         // The position; then whichever orientation is given.
+        let settings = self.settings_of(node);
         let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
             out.p = vector(pos);
@@ -269,7 +176,7 @@ impl<'a> MjcfReader<'a> {
             let axis = Vector3::new(x, y, z)
                 .try_normalize(1e-12)
                 .ok_or_else(|| fault("axisangle"))?;
-            out.r = rotation_about(&axis, self.angle(angle));
+            out.r = rotation_about(&axis, settings.angle(angle));
         }
         // The x axis is kept; the y axis is made perpendicular to it.
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
@@ -294,13 +201,13 @@ impl<'a> MjcfReader<'a> {
         if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
             out.r = Matrix3::identity();
             // One rotation after the other, in the sequence of the file.
-            for (letter, angle) in self.compiler.euler.chars().zip(angles) {
+            for (letter, angle) in settings.euler.chars().zip(angles) {
                 let axis = match letter.to_ascii_lowercase() {
                     'x' => Vector3::x(),
                     'y' => Vector3::y(),
                     _ => Vector3::z(),
                 };
-                let turn = rotation_about(&axis, self.angle(angle));
+                let turn = rotation_about(&axis, settings.angle(angle));
                 out.r = if letter.is_ascii_lowercase() {
                     out.r * turn
                 } else {
@@ -377,7 +284,7 @@ impl<'a> MjcfReader<'a> {
         self.world.push(parent.compose(&placed));
         let inertial = match self.inertial(node, around.class) {
             // A body that is fixed to the world needs no mass, if the total is not scaled.
-            Err(_) if self.is_fixed(node, around.link) && self.compiler.total_mass.is_none() => {
+            Err(_) if self.is_fixed(node, around.link) && self.settings.main().total_mass.is_none() => {
                 DescriptionInertia::default()
             }
             inertial => inertial?,
@@ -437,7 +344,7 @@ impl<'a> MjcfReader<'a> {
     fn inertial(&mut self, node: &Node<'a, '_>, class: Option<&'a str>) -> Result<DescriptionInertia, String> {
         let given = self.find_inertial(node)?;
         // The given inertia counts, unless the file demands that of the shapes.
-        let mut found = match (given, self.compiler.from_geoms) {
+        let mut found = match (given, self.settings_of(node).from_geoms) {
             (Some((given, place)), None | Some(false)) => {
                 let mut placed = self.read_placement(&given, None)?;
                 let [mass] = exact_numbers(&given, "mass", &required_attribute(&given, "mass")?)?;
@@ -467,8 +374,9 @@ impl<'a> MjcfReader<'a> {
             _ => self.inertia_from_geoms(node, class)?,
         };
         // Lower bounds of the compiler settings.
-        found.mass = found.mass.max(self.compiler.least_mass);
-        found.inertia = self.bounded_inertia(found.inertia);
+        let settings = self.settings_of(node);
+        found.mass = found.mass.max(settings.least_mass);
+        found.inertia = settings.bounded_inertia(found.inertia);
         Ok(found)
     }
 
@@ -487,29 +395,10 @@ impl<'a> MjcfReader<'a> {
         Ok(None)
     }
 
-    /// An inertia with the bounds of the file, applied to the principal moments as in MuJoCo.
-    fn bounded_inertia(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
-        let mut moments = inertia.symmetric_eigen();
-        let given = moments.eigenvalues;
-        let least = self.compiler.least_inertia;
-        moments.eigenvalues = given.map(|moment| moment.max(least));
-        let all = moments.eigenvalues;
-        // The sum of two principal moments cannot be less than the third.
-        if self.compiler.balances_inertia && 2.0 * all.max() > all.sum() {
-            moments.eigenvalues.fill(all.mean());
-        }
-        // An unchanged matrix is returned as it is, without rounding errors.
-        if moments.eigenvalues == given {
-            inertia
-        } else {
-            moments.recompose()
-        }
-    }
-
     /// Scales all masses and inertias by one factor, if the file specifies the total mass.
     fn scale_to_total(&mut self) {
         let masses = self.out.links.iter().map(|link| link.inertial.mass);
-        let (sum, Some(total)) = (masses.sum::<f64>(), self.compiler.total_mass) else {
+        let (sum, Some(total)) = (masses.sum::<f64>(), self.settings.main().total_mass) else {
             return;
         };
         if sum <= 0.0 {
@@ -560,7 +449,7 @@ impl<'a> MjcfReader<'a> {
         }
         // Often shapes for the picture only are in another group and have no mass.
         let [group] = self.numbers(node, class, "group")?.unwrap_or([0.0]);
-        let [first, last] = self.compiler.groups;
+        let [first, last] = self.settings_of(node).groups;
         if !(first..=last).contains(&group) {
             return Ok(None);
         }
@@ -678,7 +567,7 @@ impl<'a> MjcfReader<'a> {
             if kind == DescriptionJointKind::Prismatic {
                 value
             } else {
-                reader.angle(value)
+                reader.settings_of(node).angle(value)
             }
         };
         if matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
@@ -688,7 +577,7 @@ impl<'a> MjcfReader<'a> {
         // A range counts if `limited` is true, or if it is not specified and `autolimits` is true.
         let limited = self.text(node, class, "limited")?.unwrap_or("auto");
         if let Some(range) = self.numbers::<2>(node, class, "range")? {
-            let counts = limited == "true" || (limited == "auto" && self.compiler.has_auto_limits);
+            let counts = limited == "true" || (limited == "auto" && self.settings_of(node).has_auto_limits);
             if counts && kind == DescriptionJointKind::Ball {
                 self.out.remarks.push(located_message(
                     node,

@@ -8,6 +8,7 @@ use roxmltree::Node;
 
 use super::description::{DescriptionJointKind, StraightDrive};
 use super::mjcf::MjcfReader;
+use super::mjcf_attach::ATTACHED;
 use super::xml::{children, located_message, numbers, required_attribute};
 
 /// Limits of the sum of all actuators at each joint, by its name, N or N m; none if one of them has no limits.
@@ -293,6 +294,10 @@ impl<'a> MjcfReader<'a> {
 
     /// Reads the first keyframe with positions, as the pose from which loops are closed.
     pub(super) fn read_keyframe(&mut self, root: &Node<'a, '_>) -> Result<(), String> {
+        if let Some(section) = children(root, "keyframe").find(|section| section.has_attribute(ATTACHED)) {
+            let says = "the keyframes of attached models are left out; joints start at the pose of the description";
+            self.out.remarks.push(located_message(&section, says));
+        }
         let mut keys = children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
         let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text))) else {
             return Ok(());

@@ -9,10 +9,11 @@ use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
+use super::mjcf_attach::ATTACHED;
 use super::xml::{children, located_message};
 
 /// Name of the outermost class.
-const MAIN_CLASS: &str = "main";
+pub(super) const MAIN_CLASS: &str = "main";
 
 /// The default classes of a file. Names and attributes are looked up in tables, because every attribute of every element
 /// may come from a class.
@@ -53,7 +54,9 @@ impl<'a> MjcfDefaults<'a> {
                 return Err(located_message(&node, "a default class needs the attribute `class`"));
             }
         };
-        let parent = enclosing.or(self.by_name.get(MAIN_CLASS).copied());
+        // The main class that a section at the top continues.
+        let main = if node.has_attribute(ATTACHED) { name } else { MAIN_CLASS };
+        let parent = enclosing.or(self.by_name.get(main).copied());
         let mut values = BTreeMap::new();
         for element in node.children().filter(Node::is_element) {
             for attribute in element.attributes().filter(|a| a.namespace().is_none()) {
@@ -64,7 +67,7 @@ impl<'a> MjcfDefaults<'a> {
         let own = self.classes.len();
         self.classes.push(MjcfDefaultClass { parent, values });
         if enclosing.is_none() {
-            self.by_name.insert(MAIN_CLASS, own);
+            self.by_name.insert(main, own);
         }
         self.by_name.entry(name).or_insert(own);
         for inner in children(&node, "default") {

@@ -12,6 +12,9 @@ use super::xml::{located_message, required_attribute};
 use super::xml_budget::check_xml_budget;
 use super::xml_repair::readable_xml;
 
+/// Gives the text of a file by its name; fails with a sentence.
+pub type FileReader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
+
 /// Largest depth of nested includes.
 const DEEPEST: usize = 20;
 
@@ -19,7 +22,7 @@ const DEEPEST: usize = 20;
 /// file itself. `read` gives the text of a file by its name.
 ///
 /// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
-pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
+pub(super) fn expand_includes(text: &str, read: FileReader) -> Result<String, String> {
     expand_file(text, "", read, &mut Vec::new(), NestingLevel::top(DEEPEST))
 }
 
@@ -28,7 +31,7 @@ pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>
 fn expand_file(
     text: &str,
     folder: &str,
-    read: &dyn Fn(&str) -> Result<String, String>,
+    read: FileReader,
     seen: &mut Vec<String>,
     level: NestingLevel,
 ) -> Result<String, String> {
@@ -71,7 +74,7 @@ fn expand_file(
             .map_err(|fault| located_message(&node, &format!("`{name}` cannot be included; {fault}")))?;
         let other = other.map_err(|fault| located_message(&node, &fault))?;
         // The other file's own includes are expanded.
-        let folder_of_other = place[..place.rfind('/').map_or(0, |slash| slash + 1)].to_owned();
+        let folder_of_other = folder_of(&place).to_owned();
         seen.push(place);
         let whole = expand_file(&other, &folder_of_other, read, seen, inside)
             .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
@@ -89,4 +92,9 @@ fn expand_file(
     }
     out.push_str(&text[from..]);
     Ok(out)
+}
+
+/// The folder of a path, with the slash at its end; empty for a file without one.
+pub(super) fn folder_of(path: &str) -> &str {
+    &path[..path.rfind('/').map_or(0, |slash| slash + 1)]
 }

@@ -12,8 +12,9 @@ use super::description::DescriptionInertia;
 use super::geoms::GIVE_INERTIAL;
 use super::meshes::{MeshInertia, TriangleMesh};
 use super::mjcf::MjcfReader;
+use super::mjcf_attach::FILE_FOLDER;
 use super::placed::{DescriptionPose, rotation_from_quaternion};
-use super::xml::{children, located_message, numbers, vector};
+use super::xml::{located_message, numbers, vector};
 
 /// Reads the bytes of a mesh file by its name relative to the folder of the description; fails with a sentence.
 #[derive(Clone, Copy)]
@@ -28,6 +29,8 @@ impl fmt::Debug for MeshFiles<'_> {
 /// Settings of `<compiler>` for the files of meshes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeshFolder {
+    /// Folder of the file with the settings, relative to that of the description; ends with a slash or is empty.
+    file_folder: String,
     /// `meshdir`, or else `assetdir`; empty without both.
     folder: String,
     /// Whether paths of files are cut down to their last part.
@@ -35,11 +38,11 @@ pub(super) struct MeshFolder {
 }
 
 impl MeshFolder {
-    /// Reads the settings of all `<compiler>` elements.
-    pub(super) fn read(root: &Node) -> Self {
-        let all: Vec<Node> = children(root, "compiler").collect();
+    /// Reads the settings of all `<compiler>` elements of a file.
+    pub(super) fn read(all: &[Node]) -> Self {
         let last = |key: &str| all.iter().filter_map(|node| node.attribute(key)).next_back();
         Self {
+            file_folder: last(FILE_FOLDER).unwrap_or_default().to_owned(),
             folder: last("meshdir").or(last("assetdir")).unwrap_or_default().to_owned(),
             strips_paths: last("strippath") == Some("true"),
         }
@@ -48,10 +51,12 @@ impl MeshFolder {
     /// The path of a mesh file relative to the description.
     fn path(&self, file: &str) -> String {
         let file = if self.strips_paths { last_part(file) } else { file };
+        let own = &self.file_folder;
         match self.folder.trim_end_matches('/') {
-            "" => file.to_owned(),
             _ if file.starts_with('/') => file.to_owned(),
-            folder => format!("{folder}/{file}"),
+            "" => format!("{own}{file}"),
+            folder if folder.starts_with('/') => format!("{folder}/{file}"),
+            folder => format!("{own}{folder}/{file}"),
         }
     }
 }
@@ -133,7 +138,7 @@ impl<'a> MjcfReader<'a> {
             let says = "the file of this mesh can only be read if the description is given as a file";
             return Err(located_message(entry, says));
         };
-        let path = self.mesh_folder.path(file);
+        let path = self.settings_of(entry).mesh_folder.path(file);
         let bytes = read(&path).map_err(|fault| located_message(entry, &fault))?;
         TriangleMesh::read(&path, &bytes).map_err(|fault| located_message(entry, &format!("`{path}`: {fault}")))
     }
@@ -145,7 +150,7 @@ fn find_mesh<'a, 'i>(geom: &Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     let assets = root.children().filter(|node| node.has_tag_name("asset"));
     let mut entries = assets.flat_map(|asset| asset.children().filter(|node| node.has_tag_name("mesh")));
     entries.find(|entry| {
-        let of_file = || entry.attribute("file").map(|file| without_ending(last_part(file)));
+        let of_file = || entry.attribute("file").map(name_of_file);
         entry.attribute("name").or_else(of_file) == Some(name)
     })
 }
@@ -155,8 +160,9 @@ fn last_part(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// The name of a file without its ending.
-fn without_ending(file: &str) -> &str {
+/// The name of a file without its folder and its ending, which is the name of a mesh that has no other.
+pub(super) fn name_of_file(path: &str) -> &str {
+    let file = last_part(path);
     file.rsplit_once('.').map_or(file, |(name, _)| name)
 }
 

@@ -16,6 +16,8 @@ mod locks;
 mod meshes;
 mod mjcf;
 mod mjcf_actuators;
+mod mjcf_attach;
+mod mjcf_compiler;
 mod mjcf_defaults;
 mod mjcf_equalities;
 mod mjcf_include;
@@ -35,7 +37,8 @@ mod xml;
 mod xml_budget;
 mod xml_repair;
 
-pub use mjcf_include::expand_includes;
+pub use mjcf_attach::expand_other_files;
+pub use mjcf_include::FileReader;
 pub use mjcf_meshes::MeshFiles;
 pub use thresholds::{LARGEST_DESCRIPTION, LARGEST_MESH};
 

@@ -1,6 +1,7 @@
 //! From a rig and a plan, or from a URDF, to a model file.
 
 mod approximations;
+mod attached;
 mod budgets;
 mod couplings;
 mod descriptions;

@@ -187,7 +187,7 @@ fn included_files_stand_in_their_place() {
         "bar.xml" | "deep/parts/inner.xml" => Ok(format!("<mujoco>\n{}\n</mujoco>", bar("bar", "0 0 0", ""))),
         other => Err(format!("{other} is not there")),
     };
-    let whole = modelmill_reduction::expand_includes(main, &read).unwrap();
+    let whole = modelmill_reduction::expand_other_files(main, &read).unwrap();
     // Places of the main file stay.
     let fault = import(&whole, &ImportOptions::default()).unwrap_err().to_string();
     assert!(fault.starts_with("line 5"), "{fault}");
@@ -195,15 +195,15 @@ fn included_files_stand_in_their_place() {
     let model = import(&sound, &ImportOptions::default()).unwrap().model;
     assert!(model.contains("name = \"bar\""), "{model}");
     let deep = main.replace("bar.xml", "deep/bar.xml");
-    assert_eq!(modelmill_reduction::expand_includes(&deep, &read).unwrap(), whole);
+    assert_eq!(modelmill_reduction::expand_other_files(&deep, &read).unwrap(), whole);
     let lost = main.replace("bar.xml", "bare.xml");
-    let fault = modelmill_reduction::expand_includes(&lost, &read).unwrap_err();
+    let fault = modelmill_reduction::expand_other_files(&lost, &read).unwrap_err();
     assert!(
         fault.contains("line 4") && fault.contains("bare.xml is not there"),
         "{fault}"
     );
     let twice = main.replace("more/defaults.xml", "bar.xml");
-    let fault = modelmill_reduction::expand_includes(&twice, &read).unwrap_err();
+    let fault = modelmill_reduction::expand_other_files(&twice, &read).unwrap_err();
     assert!(fault.contains("included twice"), "{fault}");
 }
 

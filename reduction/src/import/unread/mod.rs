@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node};
 
+use super::mjcf_attach::{ATTACHED, FILE_FOLDER};
 use super::xml::line;
 
 /// An element and what may stand in it. Words are separated by blanks. A word `name=a,b` is without effect only if the
@@ -92,7 +93,10 @@ pub(super) fn unread_remarks(document: &Document) -> Vec<String> {
 fn collect_unread(node: &Node, rules: &[ElementRule], found: &mut UnreadItems) {
     let tag = node.tag_name().name();
     let rule = rule_of(node, rules);
-    for attribute in node.attributes() {
+    for attribute in node
+        .attributes()
+        .filter(|a| ![ATTACHED, FILE_FOLDER].contains(&a.name()))
+    {
         if !rule.is_some_and(|rule| has_word(rule.attributes, attribute.name(), attribute.value())) {
             found.add(format!("`{}` of <{tag}>", attribute.name()), line(node));
         }
