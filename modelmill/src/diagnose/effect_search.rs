@@ -1,7 +1,7 @@
 //! The search for missing effects with all that may repeat it: differences between recordings, wrong constants, and
 //! zeros of the model file. A model with its recordings goes in; the best answer comes out.
 
-use modelmill_identify::diagnose::DiagnosisVerdict;
+use modelmill_identify::diagnose::{DiagnosisVerdict, IdentifiedEffect};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -43,7 +43,19 @@ pub(super) fn search_effects(
     if !between.is_empty() {
         // A missing effect may look like a difference between recordings.
         let without = search.find(&[], None)?;
-        if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
+        // Without a further effect of the machine, what explains less is no better explanation.
+        let is_known =
+            |effect: &IdentifiedEffect| answer.diagnosis.effects.iter().any(|one| one.effect == effect.effect);
+        let least_gain = if without.diagnosis.effects.iter().all(is_known) {
+            1.0
+        } else {
+            DIFFERENCE_LEAST_GAIN
+        };
+        let drives: Vec<bool> = (0..model.drives().len())
+            .map(|d| between.iter().any(|one| one.acts_on(d)))
+            .collect();
+        let [with, without_them] = [&answer, &without].map(|one| one.mean_square_residual_of(|d| drives[d]));
+        if without_them < least_gain * with {
             answer = without;
             between.clear();
         }

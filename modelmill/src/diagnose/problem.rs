@@ -83,8 +83,13 @@ impl DiagnosisSolution {
 
     /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
     pub(crate) fn mean_square_residual(&self) -> f64 {
-        let parts = self.diagnosis.budgets.iter().zip(&self.diagnosis.residual);
-        let parts = parts.map(|(budget, rest)| {
+        self.mean_square_residual_of(|_| true)
+    }
+
+    /// The same for some of the drives, by their indices.
+    pub(crate) fn mean_square_residual_of(&self, is_counted: impl Fn(usize) -> bool) -> f64 {
+        let parts = self.diagnosis.budgets.iter().zip(&self.diagnosis.residual).enumerate();
+        let parts = parts.filter(|(d, _)| is_counted(*d)).map(|(_, (budget, rest))| {
             let squares = rest.iter().map(|r| r * r).sum::<f64>() / rest.len().max(1) as f64;
             squares / budget.force.powi(2).max(f64::MIN_POSITIVE)
         });

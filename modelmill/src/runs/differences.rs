@@ -23,6 +23,14 @@ pub(crate) struct RecordingDifference {
     pub(crate) force: ForceColumn,
 }
 
+impl RecordingDifference {
+    /// Whether it causes a force at a drive.
+    pub(crate) fn acts_on(&self, drive: usize) -> bool {
+        let values = self.force.0.get(drive).and_then(Option::as_ref);
+        values.is_some_and(|values| values.iter().any(|force| *force != 0.0))
+    }
+}
+
 /// A change with its columns and their values.
 struct ValuedChange {
     /// The change.
