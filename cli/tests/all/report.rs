@@ -67,7 +67,7 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
             "constant_error" => "wrong length or angle".to_owned(),
             "lumped_mass_placement" => "correction of the moment of a lumped mass".to_owned(),
             "two_point_element" => "spring or damper between two points".to_owned(),
-            "untied_part" => "parameters of its own instead of shared ones".to_owned(),
+            "untied_part" => "separate parameters instead of shared ones".to_owned(),
             name => name.replace('_', " "),
         };
         let explained = holds(&page, number(candidate, "/explained"));

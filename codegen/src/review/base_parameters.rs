@@ -193,12 +193,12 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     // How the dependencies were found decides for which values of the constants they are valid.
     page.paragraph([text(match &reduction.method {
         ReductionMethod::Exact { confirmed_at, .. } => format!(
-            "The following columns are constant combinations of retained columns at every state, eq. (6). \
+            "At every state, the following columns are linear combinations of retained columns with constant factors, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
         ReductionMethod::Unreduced => "Columns are not reduced.".to_owned(),
         ReductionMethod::Numeric { least_kept, most_dropped, residual, constant_change, because } => format!(
-            "The following columns are constant combinations of retained columns, eq. (6). \
+            "The following columns are linear combinations of retained columns with constant factors, eq. (6). \
              They were found numerically with the values of this file: {because}. \
              The factors are rounded; base and factors are valid for these values only. \
              In the span of the other columns, every retained column has a residual of at least {least_kept:.1e} of its size, \

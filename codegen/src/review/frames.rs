@@ -228,7 +228,8 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     // Each form has its own table, because the third and fourth columns differ.
     if !about_centre.is_empty() {
         page.paragraph([text(
-            "Parts by mass, centre of mass, and inertia about the centre of mass in the frame's axes. Entries not listed are zero.",
+            "Each part has a mass, a centre of mass, and an inertia about the centre of mass in the frame's axes. \
+             Entries not listed are zero.",
         )]);
         let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m²"];
         page.table(
@@ -241,7 +242,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     }
     if !linear.is_empty() {
         page.paragraph([text(
-            "Parts by mass, first moment, and inertia about the frame's origin. Entries not listed are zero.",
+            "Each part has a mass, a first moment, and an inertia about the frame's origin. Entries not listed are zero.",
         )]);
         let head = vec!["part", "frame", "mass, kg", "first moment, kg m", "inertia, kg m²"];
         page.table("parts", PageTable { head, rows: linear });

@@ -119,7 +119,10 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     if determinants.is_empty() {
         says.push_str(" A pose where their matrix is singular is reported.");
     } else {
-        says.push_str(" The pose is singular, and is reported, where a determinant of these equations or of the drives' Jacobian is zero:");
+        says.push_str(
+            " A pose is singular if a determinant of these equations or of the drives' Jacobian is zero. \
+             Such a pose is reported. The determinants are:",
+        );
     }
     page.paragraph([text(says)]);
     page.equations("determinants", determinants);
@@ -316,7 +319,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     if any_linear {
         page.paragraph([text(
             "Lengths of the linear drives and their derivatives with respect to the independent coordinates, the Jacobian J. \
-             Entries not listed are zero, or too long for this list; the programs below show those. \
+             Entries not listed are zero, or too long for this list; the programs below show the long ones. \
              By the principle of virtual power, J' f is the generalised force of the independent coordinates.",
         )]);
         page.blocks.push(PageBlock::Equations(lines));

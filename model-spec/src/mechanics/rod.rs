@@ -19,8 +19,8 @@ impl MechanicsEntry for RodMechanics {
     }
 
     fn introduction(&self) -> &'static str {
-        "a rod that rotates about the first point and slides through the second; its second and first moment about the \
-         first point, and its mass: "
+        "a rod that rotates about the first point (the pivot) and slides through the second point; its moment of inertia \
+         and first moment of mass about the pivot, and its mass: "
     }
 
     fn acts_on(&self) -> ActsOn {

@@ -60,7 +60,7 @@ pub fn kind(name: &str) -> String {
         "lumped_mass_placement" => "correction of the moment of a lumped mass".to_owned(),
         "periodic_in_time" => "sinusoidal disturbance".to_owned(),
         "two_point_element" => "spring or damper between two points".to_owned(),
-        "untied_part" => "parameters of its own instead of shared ones".to_owned(),
+        "untied_part" => "separate parameters instead of shared ones".to_owned(),
         _ => name.replace('_', " "),
     }
 }
@@ -278,7 +278,10 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
             "with the effects found, it explains almost nothing of the residual"
         }
         RejectionReason::ExplainsNothing => "explains almost none of the error",
-        RejectionReason::OnlyNoiseRemains => "only noise remains",
+        RejectionReason::OnlyNoiseRemains if has_findings => {
+            "with the effects found, the residual is only noise or rounding"
+        }
+        RejectionReason::OnlyNoiseRemains => "the residual is only noise or rounding",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
         RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",
         RejectionReason::GainTooSmall => "the gain is too small to matter",

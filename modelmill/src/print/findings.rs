@@ -335,7 +335,7 @@ impl DiagnosisFindings {
             &[
                 ("drive", ColumnAlignment::Left),
                 ("noise or rounding", ColumnAlignment::Right),
-                ("varies with time", ColumnAlignment::Right),
+                ("varies with time only", ColumnAlignment::Right),
                 ("repeatable, unexplained", ColumnAlignment::Right),
                 ("subtracted disturbances", ColumnAlignment::Right),
             ],

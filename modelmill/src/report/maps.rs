@@ -157,7 +157,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, varia
         let picture = picture(&maps, &grid, &names, unit);
         let _ = writeln!(
             html,
-            "<figure class=\"still\"><figcaption><b>rms error of {} over {} and {}</b></figcaption>\n{picture}</figure>",
+            "<figure class=\"still\"><figcaption><b>rms error of {} as a function of {} and {}</b></figcaption>\n{picture}</figure>",
             escape(drive),
             escape(&variable_phrase(&before.model, &variables[i].0)),
             escape(&variable_phrase(&before.model, &variables[j].0)),

@@ -140,13 +140,13 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. \
          The noise or rounding in the picture and in the summary is the rms value over all recordings; in one recording it can \
          be smaller or larger.</p>\n<ul>\n\
-         <li><i>decrease of the squared error</i>: relative to the step before, {}, on the drives on which the added effects \
-         act.</li>\n\
+         <li><i>decrease of the squared error</i>: relative to the step before, evaluated {} and only for the drives on \
+         which the added effects act.</li>\n\
          <li><i>t value of the decrease</i>: its mean over blocks of time, divided by its standard error.</li>\n\
          <li><i>effective samples</i>: the number of independent samples that carry as much information as the samples of the \
          residual, which are correlated in time.</li>\n</ul>\n{}\
-         <p><i>upper bound of the noise</i>: from differences of successive samples. Standard deviations of the missing effects \
-         assume this noise, or the residual if that is larger.</p>\n",
+         <p><i>upper bound of the noise</i>: computed from differences of successive samples. The standard deviations \
+         of the parameters of missing effects are computed from this bound or from the residual, whichever is larger.</p>\n",
         findings.validation.phrase(),
         steps::picture(findings),
         tables::steps(findings),
@@ -280,8 +280,8 @@ fn location(findings: &DiagnosisFindings) -> String {
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>Mean and standard deviation of the error over one variable. The range named in the caption is shaded. The same \
-             samples may be in the ranges of several variables. {}</p>",
+            "<p>Mean and standard deviation of the error as functions of one variable. The range named in the caption is shaded. \
+             The same samples may be in the ranges of several variables. {}</p>",
             legend(after.is_some())
         );
         html.push_str(&regions::figures(
@@ -351,9 +351,9 @@ fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
         "<p>The table lists every kind of effect and disturbance at every place (drive, joint, point, body) where it can act. \
          <i>squared error explained if added alone</i>: the share of the squared error of the given model that the candidate \
-         removes without any other effect. <i>gain in addition to the effects found</i>: the share of the squared residual of the \
-         model with these effects that the candidate removes. For a found effect, the reference is the model with all other found \
-         effects.\
+         removes without any other effect. <i>gain in addition to the effects found</i>: the share of the squared residual that \
+         the candidate removes if it is added to the model with these effects. For a found effect, the reference is the model with \
+         all other found effects.\
          <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )
@@ -369,10 +369,10 @@ fn parameters(findings: &DiagnosisFindings) -> String {
         Some(after) => {
             html.push_str(
                 "<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive \
-                 are divided by the standard deviation of its residual. The standard deviations of the parameters are computed \
-                 from the residual alone, and allow for its correlation in time. Those of the missing effects are computed from \
-                 the residual or from the upper bound of the noise, whichever is larger. So one quantity may have two standard \
-                 deviations.</p>\n",
+                 are divided by the standard deviation of its residual. The standard deviations in this section are computed \
+                 from the residual alone, and allow for its correlation in time. Those in the section of missing effects are \
+                 computed from the residual or from the upper bound of the noise, whichever is larger. So the two sections may \
+                 give different standard deviations of the same parameter.</p>\n",
             );
             html.push_str(&tables::parameters(after));
             let _ = writeln!(

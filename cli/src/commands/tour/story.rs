@@ -89,10 +89,10 @@ impl TourText {
         self.lines(&tables::expressions(2, model));
         self.line("");
         self.paragraph(
-            "Both sides have the same parameters. A crank has mass m1, length d1, centre of mass at distance dc1 from its base \
-             joint, and moment of inertia Ic12 about this centre. A coupler has m3, d3, dc3 (from its elbow) and Ic32. Point masses: \
-             m2 at each elbow (points R2m and R4m), and half of the platform's mass m4 at the end of each coupler (points R3m and \
-             R3m_right).",
+            "The left and the right side of the robot have the same parameters. A crank has mass m1, length d1, centre of mass at \
+             distance dc1 from its base joint, and moment of inertia Ic12 about this centre. A coupler has m3, d3, dc3 (from its \
+             elbow) and Ic32. Point masses: m2 at each elbow (points R2m and R4m), and half of the platform's mass m4 at the end of \
+             each coupler (points R3m and R3m_right).",
         );
         self.command(&format!("equations {name}"));
     }
@@ -146,10 +146,10 @@ impl TourText {
             "modelmill tries every effect of its library (`modelmill effects` lists them) at every place of this mechanism: \
              friction of many kinds, springs, force offsets, inertia of drive rods and others. It also tries errors that are not \
              in the library: wrong lengths, and faults of signals, such as a drift, a wrong gain or a wrong zero of an encoder. \
-             These are {} in all. modelmill fits sets of candidates, together with the base parameters, to one recording. It \
-             accepts an effect only if the error also falls on a second recording that is not fitted (the validation run). \
-             Step 2 showed the validation run, with an error of {} for nominal parameters. With base parameters estimated from \
-             the other recording, and no effect added, this error is {}.",
+             These are {} in all. modelmill fits sets of candidates, together with the base parameters, to one recording. An \
+             effect is accepted only if it also reduces the error on a second recording, which is not fitted (the validation \
+             run). Step 2 used this validation run: with the nominal parameters the error on it is {}. With base parameters \
+             estimated from the fitted recording, and without added effects, the error on the validation run is {}.",
             count(all.len(), "candidate", "candidates"),
             percent(seen.compared.figures.nrms),
             percent(findings.diagnosis.steps.first().map(|step| step.check))
@@ -209,9 +209,9 @@ impl TourText {
             return;
         };
         self.paragraph(&format!(
-            "A few lines in the model file describe the effect. The estimates of its parameters become their nominal values: Jr \
-             and Sr are the moment of inertia and the first moment of mass of a rod about its pivot, the same for both screws. \
-             Comments and layout of the file do not change. The tour writes the result to {}, as the command below does:",
+            "A few lines in the model file describe the effect. They give the estimates of its parameters as nominal values. Jr \
+             and Sr are the moment of inertia and the first moment of mass of a rod about its pivot. Both screws have the same \
+             values. Comments and layout of the file do not change. The tour writes the result to {}, as the command below does:",
             place.name(EDITED)
         ));
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
@@ -297,10 +297,10 @@ impl TourText {
     pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
         self.heading("6  Diagnose a published model");
         self.paragraph(
-            "The paper that describes this robot reports an error of its model. It names two causes: the positions of the point \
-             masses that replace the coupling elements and the platform, and the contact points of the screws on the cranks. \
-             modelmill finds a third cause, in the equations of the paper: they give half of the platform's mass m4 to each \
-             coupler. In the balance of forces this half is at the end of the coupler (R3m or R3m_right). In the balance of moments \
+            "The paper that describes this robot reports an error of its model. It names two causes. The first is the positions of \
+             the point masses, which replace the coupling elements and the platform. The second is the contact points of the screws \
+             on the cranks. modelmill finds a third cause, in the equations of the paper: they give half of the platform's mass m4 \
+             to each coupler. In the balance of forces this half is at the end of the coupler (R3m or R3m_right). In the balance of moments \
              it is at the coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines all \
              three causes. The recording is a simulation of the same robot without rods. The base parameters are fixed at their \
              nominal values (`--held`), as in step 2:",
