@@ -43,11 +43,12 @@ pub(super) fn search_effects(
     if !between.is_empty() {
         // A missing effect may look like a difference between recordings.
         let without = search.find(&[], None)?;
-        // Without a further effect of the machine, what explains less is no better explanation.
+        // Drifts and steps have more parameters than a difference, so that without a further effect of the machine they
+        // must explain more than it does.
         let is_known =
             |effect: &IdentifiedEffect| answer.diagnosis.effects.iter().any(|one| one.effect == effect.effect);
         let least_gain = if without.diagnosis.effects.iter().all(is_known) {
-            1.0
+            DIFFERENCE_LEAST_GAIN.recip()
         } else {
             DIFFERENCE_LEAST_GAIN
         };
