@@ -33,7 +33,7 @@ pub struct NewEffect {
     pub at: Vec<String>,
     /// Whether each place has parameters of its own; otherwise the places share them.
     pub is_at_each: bool,
-    /// Symbols of parameters of the kind that it does not have.
+    /// Symbols of those parameters of its kind that this effect omits.
     pub without: Vec<String>,
     /// Names and nominal values of its parameters; all others have the defaults of the kind.
     pub parameters: Vec<NewParameter>,
@@ -241,7 +241,8 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
     Ok(kept + &identified_table(values, line_end))
 }
 
-/// Writes the vector of gravity into the text of a model file, m/s^2: in place of its entry, or in front of all others.
+/// Writes the vector of gravity, m/s^2, into the text of a model file. It replaces the entry `gravity`; without such an
+/// entry, it is inserted before all other entries.
 ///
 /// Fails if the text is not TOML.
 ///

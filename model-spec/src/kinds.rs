@@ -221,7 +221,7 @@ pub struct KindConstant {
     pub symbol: String,
     /// Default value as text; `None` if the effect must give one.
     pub value: Option<String>,
-    /// Units by what the place carries.
+    /// Its unit for each kind of load of a place.
     pub units: Vec<(PlaceLoad, String)>,
     /// How it is found if it is unknown; `None` if it must be known.
     pub search: Option<ConstantSearch>,

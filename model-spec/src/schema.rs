@@ -605,7 +605,7 @@ record! {
 }
 
 record! {
-    /// Units by what the place carries.
+    /// Units for each kind of load of a place.
     UnitTable = "a set of units" {
         /// Where the place carries a force.
         "force" force: optional ModelUnit,

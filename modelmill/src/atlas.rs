@@ -1,8 +1,9 @@
-//! An atlas of mechanisms: how many base parameters each has, what they are, and what its functions cost.
+//! An atlas of mechanisms: how many base parameters each has, what they are, and how many operations its functions
+//! need.
 //!
-//! Base parameters are counted for the bodies alone, without the effects of the file, so that they can be compared with
-//! published ones: with gravity and without. They are counted symbolically, for arbitrary values of the constants, and
-//! numerically, for the file's values.
+//! Base parameters are counted twice, with gravity and without it. They are counted for the bodies alone, without the
+//! effects of the file, so that the numbers can be compared with published ones. They are counted symbolically, for
+//! arbitrary values of the constants, and numerically, for the file's values.
 
 use modelmill_boundary::text::MarkdownText;
 use modelmill_codegen::{OperationCount, ProgramStage, ReductionMethod};

@@ -150,8 +150,9 @@ pub struct ErrorLocations {
     pub regions: Vec<ErrorRegion>,
     /// Drives whose error is rounding and was not located.
     pub rounding: Vec<String>,
-    /// How the residuals depend on the rates of their drives, drive by drive: forms of friction that are spread over
-    /// all samples, so that no region shows them. Empty if the dependence is not significant or too small to matter.
+    /// How the residual of each drive depends on the rate of this drive. It shows forms of friction whose error is
+    /// spread over all samples, and therefore appears in no region. Empty if the dependence is not significant or too
+    /// small to matter.
     pub by_rate: Vec<RateDependence>,
 }
 

@@ -26,7 +26,7 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! // `retained`: the product (here `m1*dc1`) whose regressor column was kept, of several linearly dependent ones.
+//! // Of several linearly dependent regressor columns, one is kept. `retained` is its product (here `m1*dc1`).
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())

@@ -19,7 +19,7 @@ const POSES: (usize, f64) = (100, 0.2);
 /// Endings of robot descriptions.
 const DESCRIPTION_ENDINGS: [&str; 4] = ["urdf", "xml", "mjcf", "sdf"];
 
-/// What a reduction may use.
+/// Options of a reduction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RigReductionOptions<'a> {
     /// The path of a plan file, which states the plane and the bodies that are merged to one part. Without a plan,
@@ -70,9 +70,9 @@ pub struct ProposedReduction {
 
 impl Host {
     /// Reduces a rig with spatial bodies to a planar model file, and measures the error of every approximation.
-    /// With a tolerance for gaps, the rig's joints are closed as well as possible (least squares). The rig's forces are
-    /// those of this motion. The model closes its loops exactly. So the difference of both forces is the error that the
-    /// gaps cause.
+    /// With a tolerance for gaps, the rig's joints are closed as well as possible (least squares), and the rig's forces
+    /// are computed for the motion with the remaining gaps. The model closes its loops exactly. So the difference
+    /// between the forces of rig and model is the error that the gaps cause.
     ///
     /// Fails with all errors and warnings of rig and plan, each with its place, and when the reduction does not support
     /// the mechanism.

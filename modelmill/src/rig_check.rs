@@ -34,7 +34,8 @@ pub struct RigCheck {
     pub coordinates: Vec<String>,
     /// Names of the drives.
     pub drives: Vec<String>,
-    /// The joint with the largest gap with the poses of the file, before joints are closed; absent without joints.
+    /// The joint with the largest gap if all bodies have the poses of the file, before joints are closed. `None` if the
+    /// rig has no joints.
     pub largest_gap: Option<JointGap>,
     /// The largest displacement of a body that closed the joints, m.
     pub largest_move: f64,
@@ -79,7 +80,7 @@ impl Host {
 
     /// Closes the joints of a rig and describes its contents.
     ///
-    /// Fails when the joints do not close, with the gaps of the joints as the file states them.
+    /// Fails when the joints do not close. The error lists the largest gaps of joints at the poses of the file.
     pub fn check_rig(&self, loaded: &LoadedRig) -> Outcome<RigCheck> {
         let rig = &loaded.rig;
         let mut gaps = rig.nominal_gaps();

@@ -242,8 +242,8 @@ impl ModelFunctions {
 
     /// A function at one state, without the cost of preparing lists of states: positions, rates, accelerations and
     /// forces of the drives, each complete or empty if the function does not read it. `out` has as many numbers as the
-    /// function. Returns false, without a valid output, if [`ModelFunctions::evaluate_at`] must be used: it states
-    /// faults, and follows loops that are solved by Newton's method.
+    /// function. Returns false if [`ModelFunctions::evaluate_at`] must be used instead; `out` is then not valid. That
+    /// method states faults, and can evaluate loops that are solved by Newton's method.
     ///
     /// Fails when the function cannot be derived.
     pub fn evaluate_single(

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{FileError, FileFault, FileSource, OpenFile, PathKind, normalise_path};
 
-/// Files in memory by their paths. Folders exist as far as there are files in them.
+/// Files in memory by their paths. A folder exists if it contains a file.
 ///
 /// ```
 /// use modelmill_boundary::files::{FileSource, MemoryFiles};

@@ -41,8 +41,8 @@ pub enum ParameterStatus {
     /// The recordings do not determine it. Of all values that fit equally well, it is the one nearest to the nominal
     /// values.
     Undetermined,
-    /// Fixed at its nominal value, or at 0 without one, as the recordings do not support another value in addition to
-    /// the other parameters (`identify --essential`).
+    /// Fixed, because the recordings do not support an estimate of it in addition to the other parameters
+    /// (`identify --essential`). The value is the nominal one, or 0 if there is none.
     NotEssential,
     /// A number of the model file, whose force was subtracted from the measured forces before the fit.
     Known,
@@ -104,7 +104,8 @@ pub struct FitFile {
     /// Values of the model's constants, on which the regressor and the expressions depend.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub constants: IndexMap<String, f64>,
-    /// The model's equations at one state, by which another model is recognised; absent in fits of earlier versions.
+    /// The model's equations at one state. They show whether a fit belongs to another model; absent in fits of earlier
+    /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equation_sample: Option<EquationSample>,
     /// Directions that the recording does not determine, one sentence each.

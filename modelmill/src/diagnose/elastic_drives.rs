@@ -13,7 +13,7 @@ use crate::segment::picked_states::PickedStates;
 /// Largest number of samples of a segment that are compared.
 const LOOKED_AT: usize = 500;
 
-/// An error of an encoder that an elastic drive explains as well.
+/// An error of an encoder that an elastic drive explains equally well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ElasticAlternative {
     /// Name of the coordinate whose encoder seems to be eccentric.

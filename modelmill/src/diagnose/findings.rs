@@ -104,9 +104,9 @@ pub struct DiagnosisFindings {
     /// was not needed because no estimate differs, or the first one has fixed them all already.
     pub with_nominal: Option<NominalDiagnosis>,
     /// Errors of the geometry that explain as much as the effects in [`Self::missing`] together, the best first.
-    /// Zeros that the model file writes as coordinates of points are among them.
+    /// They include errors of coordinates of points that the model file sets to zero.
     pub geometry_alternatives: Vec<GeometryAlternative>,
-    /// Errors of encoders that elastic drives explain as well.
+    /// Errors of encoders that elastic drives explain equally well.
     pub elastic_alternatives: Vec<ElasticAlternative>,
     /// The regions of large error that text and JSON report: ranges of a coordinate, velocity, load or time. If the
     /// verdict is [`DiagnosisVerdict::Unexplained`], they are regions of the residual of the unexplained drives.
@@ -132,7 +132,7 @@ pub struct DiagnosisFindings {
     /// Faults of the recordings that were corrected hypothetically: all findings hold for the corrected recordings.
     pub corrected: Vec<SuspectedFault>,
     /// Faults that could not be corrected: several explain a recording equally well, or the correction of one fails.
-    /// Nothing else is claimed then.
+    /// If there are any, the diagnosis reports no other findings.
     pub unresolved: Vec<SuspectedFault>,
     /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
@@ -149,7 +149,7 @@ pub struct MissingEffect {
     pub estimates: Vec<EffectEstimate>,
     /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
-    /// What supports it: the probability follows from this.
+    /// The values from which the probability is computed.
     pub support: EffectSupport,
     /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
@@ -183,8 +183,8 @@ pub struct SeparationProposal {
     /// Its alternatives: those in [`MissingEffect::indistinguishable_from`] whose forces along another motion can be
     /// computed.
     pub rivals: Vec<LocatedEffect>,
-    /// The other effects found, with their constants. They are assumed to be present in both cases: if this effect is
-    /// the true one, and if one of its alternatives is.
+    /// The other effects found, with their constants. They are assumed to be present, whether this
+    /// effect or one of its alternatives is the true one.
     pub common_effects: Vec<NamedEffect>,
     /// Noise of the forces, rms over the drives, N or N m; `None` if it is zero or unknown.
     pub noise: Option<f64>,

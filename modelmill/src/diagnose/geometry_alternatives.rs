@@ -42,9 +42,9 @@ const PARALLEL: f64 = 1e-3;
 /// A length or angle of the model file with its error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeometryError {
-    /// The constant; `None` for a zero that the file writes as a coordinate of a point.
+    /// The constant; `None` for a coordinate of a point that the file sets to zero.
     pub constant: Option<String>,
-    /// Point and axis of a coordinate that the file writes as zero.
+    /// Point and axis of a coordinate that the file sets to zero; `None` for a constant.
     pub zero: Option<(String, &'static str)>,
     /// The error: what must be added to the value of the file.
     pub value: f64,

@@ -58,7 +58,7 @@ pub enum RecordingFaultKind {
     DeadChannel,
     /// A force stays at one value while the machine moves: all other readings have noise, or the model predicts another.
     FrozenForce,
-    /// The largest or smallest readings of a force repeat one value: it is cut off there.
+    /// The largest or smallest readings of a force repeat one number, because the signal is clipped at this number.
     Saturation,
     /// Brakes hold the joints, and the drives are off.
     Brakes,

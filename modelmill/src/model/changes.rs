@@ -26,7 +26,8 @@ pub struct BaseValueChange {
     pub retained: String,
     /// Its unit.
     pub unit: String,
-    /// Its value before; `None` if that model has no such base parameter, or does not give all values in it.
+    /// Its value before. `None` if that model has no such base parameter, or lacks the value of a parameter in its
+    /// expression.
     pub before: Option<f64>,
     /// Its value after, likewise.
     pub after: Option<f64>,

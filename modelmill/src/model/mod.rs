@@ -382,7 +382,7 @@ impl Model {
     }
 
     /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
-    /// an effect. The retained product is the one whose regressor column was kept, of several linearly dependent ones.
+    /// an effect. Of several linearly dependent regressor columns, one is kept; the retained product is its product.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;

@@ -198,7 +198,7 @@ fn error_text(figures: &ErrorFigures) -> String {
 
 impl ModelComparison {
     /// The next step: the diagnosis if the residual looks like friction that the model lacks, the identification if the
-    /// friction of the model is too large; `None` if a quick look shows nothing.
+    /// friction of the model is too large; `None` if a quick check of the residual finds nothing.
     pub fn next_step(&self) -> Option<Message> {
         let look = ResidualLook {
             figures: &self.figures,

@@ -49,9 +49,9 @@ pub enum UndecidedReason {
         /// Share of the rms force in the worse run (1).
         share: f64,
     },
-    /// Only a change of a large part of the force would be reported.
+    /// A change would be reported only if it were a large part of the force.
     SmallestChange {
-        /// The smallest change that would be, as a share of the force (1); infinite if none would.
+        /// The smallest change that would be reported, as a share of the force (1); infinite if no change would be.
         share: f64,
     },
     /// The drive is at standstill nearly all the time, so that its friction is unknown.

@@ -63,7 +63,7 @@ pub struct ServoParameter {
     pub name: String,
     /// Its expression in parameters and gains.
     pub expression: String,
-    /// Its unit; of a ratio, that of the quotient.
+    /// Its unit; for a ratio, the unit of the quotient.
     pub unit: String,
     /// The value.
     pub value: f64,
@@ -82,7 +82,7 @@ pub struct ServoRowError {
     pub drive: String,
     /// Rms value of the part that the model does not explain, in `unit`.
     pub error: f64,
-    /// Rms value of the force of the actuator, or the measured one.
+    /// Rms value of the force of the actuator, or of the measured force.
     pub force: f64,
     /// N or N m; relative to the reference where only ratios are known.
     pub unit: String,

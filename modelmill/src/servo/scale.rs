@@ -29,7 +29,7 @@ pub struct ScaleFreedom {
     pub base: Vec<usize>,
     /// How many values must be known so that all values of the group can be identified; 1 if only its scale is unknown.
     pub open: usize,
-    /// Names of parameters of which a known number fixes the scale.
+    /// Names of parameters: if the value of one of them is known, it determines the scale.
     pub fixed_by: Vec<String>,
     /// The base parameter relative to which all others of the group are reported: a gain if there is one.
     pub reference: usize,
