@@ -114,3 +114,42 @@ fn a_cart_with_a_pendulum_is_right_to_one_percent() {
         assert!(values.iter().any(is_it), "{truth}: {values:?}");
     }
 }
+
+/// The forces of a drive of the Panda are 1.2 times as large in the validation run. A drifting zero was named in its place.
+#[test]
+fn a_scale_that_differs_between_recordings_is_named() {
+    let folder = workspace("../shared/data/panda");
+    if !folder.is_dir() {
+        println!("{} is not tested: it is not beside the workspace.", folder.display());
+        return;
+    }
+    let of = |name: &str| folder.join(name).to_str().expect("plain text").to_owned();
+    let recorded = std::fs::read_to_string(of("check.csv")).expect("a recording");
+    let mut lines = recorded.lines();
+    let names = lines.next().expect("a line of names");
+    let column = names
+        .split(',')
+        .position(|name| name == "joint4")
+        .expect("the force of a drive");
+    let scaled = lines.map(|line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        let force: f64 = cells[column].trim().parse().expect("a number");
+        cells[column] = format!("{}", 1.2 * force);
+        cells.join(",") + "\n"
+    });
+    let check = scratch("scaled-panda.csv");
+    std::fs::write(&check, format!("{names}\n{}", scaled.collect::<String>())).expect("a file");
+    // The model lies beside the one that it extends.
+    std::fs::copy(workspace("model-spec/models/panda.toml"), scratch("panda.toml")).expect("a model");
+    let model = scratch("panda-friction.toml");
+    std::fs::copy(of("panda-friction.toml"), &model).expect("a model");
+    let (answer, _) = diagnosed(&model, &[of("fit.csv")], Some(&check));
+    let faults = answer["disturbances"].as_array().expect("a list");
+    let of_kind = |kind: &str| faults.iter().filter(move |one| one["kind"] == kind).collect::<Vec<_>>();
+    let [scale] = of_kind("different_runs")[..] else {
+        panic!("{faults:?}");
+    };
+    assert_eq!(scale["at"][0], "joint4", "{scale}");
+    assert!((number(scale, "/estimates/0/value") - 1.2).abs() < 0.02, "{scale}");
+    assert!(of_kind("offset_drift").is_empty(), "{faults:?}");
+}
