@@ -1,7 +1,7 @@
 //! The search for missing effects with all that may repeat it: differences between recordings, wrong constants, and
 //! zeros of the model file. A model with its recordings goes in; the best answer comes out.
 
-use modelmill_identify::diagnose::{DiagnosisVerdict, IdentifiedEffect};
+use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance, IdentifiedEffect};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -20,6 +20,9 @@ use super::thresholds::{
 
 /// Most times a search is repeated with the errors of constants that it claims.
 const MOST_CONSTANT_ROUNDS: usize = 3;
+
+/// Disturbances that may stand in place of a difference between recordings: each recording has parameters of its own.
+const DRIFTS_AND_STEPS: [&str; 4] = ["offset_drift", "friction_drift", "offset_step", "gain_change"];
 
 /// The search for missing effects, with differences `between` recordings, which are cleared if a search without them
 /// explains more. It is repeated with zeros of the model file as candidates where these may be wrong.
@@ -43,20 +46,7 @@ pub(super) fn search_effects(
     if !between.is_empty() {
         // A missing effect may look like a difference between recordings.
         let without = search.find(&[], None)?;
-        // Drifts and steps have more parameters than a difference, so that without a further effect of the machine they
-        // must explain more than it does.
-        let is_known =
-            |effect: &IdentifiedEffect| answer.diagnosis.effects.iter().any(|one| one.effect == effect.effect);
-        let least_gain = if without.diagnosis.effects.iter().all(is_known) {
-            DIFFERENCE_LEAST_GAIN.recip()
-        } else {
-            DIFFERENCE_LEAST_GAIN
-        };
-        let drives: Vec<bool> = (0..model.drives().len())
-            .map(|d| between.iter().any(|one| one.acts_on(d)))
-            .collect();
-        let [with, without_them] = [&answer, &without].map(|one| one.mean_square_residual_of(|d| drives[d]));
-        if without_them < least_gain * with {
+        if !are_differences_needed(model, between, &answer, &without) {
             answer = without;
             between.clear();
         }
@@ -78,6 +68,47 @@ pub(super) fn search_effects(
         zeros: named,
         in_place_of_constants,
     })
+}
+
+/// Whether the search with differences between recordings explains more than that without them, at the drives on which
+/// the differences act.
+///
+/// An effect of the machine that the model lacks may look like a difference, so that differences must explain clearly
+/// more. A drift or step in place of a difference has more parameters and must explain clearly more itself.
+fn are_differences_needed(
+    model: &Model,
+    between: &[RecordingDifference],
+    with: &DiagnosisSolution,
+    without: &DiagnosisSolution,
+) -> bool {
+    let drives = model.drives();
+    let is_concerned = |d: usize| between.iter().any(|one| one.acts_on(d));
+    let further = |one: &&Disturbance| {
+        with.diagnosis
+            .disturbances
+            .iter()
+            .all(|known| (&known.kind, &known.at) != (&one.kind, &one.at))
+    };
+    let is_in_their_place = |one: &Disturbance| {
+        let is_at = |d: usize| is_concerned(d) && one.at.contains(&drives[d]);
+        DRIFTS_AND_STEPS.contains(&one.kind.as_str()) && (0..drives.len()).any(is_at)
+    };
+    let mut disturbances = without.diagnosis.disturbances.iter().filter(further);
+    let is_known = |effect: &IdentifiedEffect| with.diagnosis.effects.iter().any(|one| one.effect == effect.effect);
+    let has_further_effects = !without.diagnosis.effects.iter().all(is_known);
+    let least_gain = if !has_further_effects && disturbances.any(is_in_their_place) {
+        DIFFERENCE_LEAST_GAIN.recip()
+    } else {
+        DIFFERENCE_LEAST_GAIN
+    };
+    // Relative to the same forces in both.
+    let sum = |answer: &DiagnosisSolution| -> f64 {
+        let forces = without.diagnosis.budgets.iter().map(|budget| budget.force.powi(2));
+        let parts = answer.mean_square_residuals().zip(forces).enumerate();
+        let parts = parts.filter(|(d, (_, force))| is_concerned(*d) && *force > 0.0);
+        parts.map(|(_, (square, force))| square / force).sum()
+    };
+    sum(without) >= least_gain * sum(with)
 }
 
 /// What all searches for missing effects in the same recordings have in common.

@@ -81,19 +81,17 @@ impl DiagnosisSolution {
         (!self.are_changes_searched).then(note)
     }
 
-    /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
-    pub(crate) fn mean_square_residual(&self) -> f64 {
-        self.mean_square_residual_of(|_| true)
+    /// Mean square residual of each drive, N^2 or (N m)^2.
+    pub(crate) fn mean_square_residuals(&self) -> impl Iterator<Item = f64> {
+        let mean = |rest: &Vec<f64>| rest.iter().map(|r| r * r).sum::<f64>() / rest.len().max(1) as f64;
+        self.diagnosis.residual.iter().map(mean)
     }
 
-    /// The same for some of the drives, by their indices.
-    pub(crate) fn mean_square_residual_of(&self, is_counted: impl Fn(usize) -> bool) -> f64 {
-        let parts = self.diagnosis.budgets.iter().zip(&self.diagnosis.residual).enumerate();
-        let parts = parts.filter(|(d, _)| is_counted(*d)).map(|(_, (budget, rest))| {
-            let squares = rest.iter().map(|r| r * r).sum::<f64>() / rest.len().max(1) as f64;
-            squares / budget.force.powi(2).max(f64::MIN_POSITIVE)
-        });
-        parts.sum()
+    /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
+    pub(crate) fn mean_square_residual(&self) -> f64 {
+        let forces = self.diagnosis.budgets.iter().map(|budget| budget.force.powi(2));
+        let parts = forces.zip(self.mean_square_residuals());
+        parts.map(|(force, square)| square / force.max(f64::MIN_POSITIVE)).sum()
     }
 }
 

@@ -7,7 +7,8 @@
 pub(super) const MOST_VALIDATION_ERROR: f64 = 1.0;
 
 /// Differences between recordings are assumed only if leaving them out makes the mean square residual this many
-/// times as large (1). Otherwise what the model lacks may look like a difference. By judgement.
+/// times as large (1). Otherwise what the model lacks may look like a difference. A drift or a step replaces a
+/// difference only if its mean square residual is smaller by this factor. By judgement.
 pub(super) const DIFFERENCE_LEAST_GAIN: f64 = 1.5;
 
 /// If this part of the error stays after the last step (1), the verdict quotes the drive whose error falls most

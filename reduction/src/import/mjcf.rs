@@ -20,7 +20,7 @@ use super::xml::{children, exact_numbers, line, located_message, numbers, requir
 /// The state of the reader: settings, defaults, and the description so far.
 pub(super) struct MjcfReader<'a> {
     /// Settings of the file and of attached models.
-    settings: CompilerSettings<'a>,
+    pub(super) settings: CompilerSettings<'a>,
     /// Default classes.
     defaults: MjcfDefaults<'a>,
     /// The description.
@@ -126,7 +126,7 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
 impl<'a> MjcfReader<'a> {
     /// The settings of the file to which an element belongs.
     pub(super) fn settings_of(&self, node: &Node) -> &MjcfCompiler {
-        self.settings.of(node)
+        self.settings.find_settings(node)
     }
 
     /// An attribute of an element, its own or that of its default class.
@@ -284,7 +284,7 @@ impl<'a> MjcfReader<'a> {
         self.world.push(parent.compose(&placed));
         let inertial = match self.inertial(node, around.class) {
             // A body that is fixed to the world needs no mass, if the total is not scaled.
-            Err(_) if self.is_fixed(node, around.link) && self.settings.main().total_mass.is_none() => {
+            Err(_) if self.is_fixed(node, around.link) && self.settings.main_settings().total_mass.is_none() => {
                 DescriptionInertia::default()
             }
             inertial => inertial?,
@@ -398,7 +398,7 @@ impl<'a> MjcfReader<'a> {
     /// Scales all masses and inertias by one factor, if the file specifies the total mass.
     fn scale_to_total(&mut self) {
         let masses = self.out.links.iter().map(|link| link.inertial.mass);
-        let (sum, Some(total)) = (masses.sum::<f64>(), self.settings.main().total_mass) else {
+        let (sum, Some(total)) = (masses.sum::<f64>(), self.settings.main_settings().total_mass) else {
             return;
         };
         if sum <= 0.0 {
@@ -418,6 +418,8 @@ impl<'a> MjcfReader<'a> {
     ) -> Result<DescriptionInertia, String> {
         // All shapes of the body itself, but not those of its child bodies.
         let mut shapes = Vec::new();
+        // In MuJoCo the settings of the body decide which groups have mass, also for shapes of attached models.
+        let groups = self.settings_of(node).groups;
         let mut waiting = vec![(*node, class, DescriptionPose::identity())];
         while let Some((node, class, place)) = waiting.pop() {
             for child in node.children().filter(Node::is_element) {
@@ -426,7 +428,7 @@ impl<'a> MjcfReader<'a> {
                     "frame" => {
                         waiting.push((child, class, place.compose(&self.read_placement(&child, class)?)));
                     }
-                    "geom" => shapes.extend(self.geom_inertia(&child, class, place)?),
+                    "geom" => shapes.extend(self.geom_inertia(&child, class, place, groups)?),
                     _ => {}
                 }
             }
@@ -434,12 +436,13 @@ impl<'a> MjcfReader<'a> {
         Ok(geoms::combined_inertia(&shapes))
     }
 
-    /// Mass and inertia of one shape; none if it has no mass or is outside of the groups.
+    /// Mass and inertia of one shape; none if it has no mass or is outside of `groups`, the first and the last.
     fn geom_inertia(
         &mut self,
         node: &Node<'a, '_>,
         class: Option<&'a str>,
         place: DescriptionPose,
+        [first, last]: [f64; 2],
     ) -> Result<Option<DescriptionInertia>, String> {
         let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
         // Without a mass MuJoCo computes it from the density, by default that of water.
@@ -449,7 +452,6 @@ impl<'a> MjcfReader<'a> {
         }
         // Often shapes for the picture only are in another group and have no mass.
         let [group] = self.numbers(node, class, "group")?.unwrap_or([0.0]);
-        let [first, last] = self.settings_of(node).groups;
         if !(first..=last).contains(&group) {
             return Ok(None);
         }

@@ -14,67 +14,66 @@ use modelmill_boundary::nesting::NestingLevel;
 use roxmltree::{Document, Node};
 
 use super::mjcf_defaults::MAIN_CLASS;
-use super::mjcf_include::{FileReader, expand_includes, folder_of};
+use super::mjcf_include::{FILE_FOLDER, FileReader, expand_includes, folder_of, joined_path};
 use super::mjcf_meshes::name_of_file;
 use super::thresholds::LARGEST_DESCRIPTION;
-use super::xml::{children, located_message, required_attribute};
+use super::xml::{children, located_message, required_attribute, write_escaped};
 use super::xml_budget::check_xml_budget;
 
 /// Attribute of elements of attached models: the number of the attached model.
 pub(super) const ATTACHED: &str = "modelmill-attached";
-/// Attribute of the `<compiler>` of an attached model: the folder of its file relative to that of the main file.
-pub(super) const FILE_FOLDER: &str = "modelmill-folder";
 
 /// Largest depth of attached models inside attached models.
 const DEEPEST: usize = 20;
 
-/// Sections of an attached model that the outer model does not take over.
-const LEFT_BEHIND: [&str; 8] = [
+/// Most bytes of models that are parsed for attachment, all together: each `<attach>` parses its model again.
+const MOST_PARSED: usize = 8 * LARGEST_DESCRIPTION;
+
+/// Sections of an attached model that the outer model does not take over, or that have no effect on a model.
+const LEFT_BEHIND: [&str; 10] = [
     "compiler",
+    "contact",
+    "include",
+    "keyframe",
     "option",
+    "sensor",
     "size",
     "statistic",
     "visual",
-    "keyframe",
     "worldbody",
-    "include",
 ];
-/// Sections whose elements may refer to something that is not attached.
-/// Those to which others refer come first.
-const WITH_REFERENCES: [&str; 5] = ["tendon", "equality", "actuator", "contact", "sensor"];
-/// Attributes that refer to an element by its name.
-const REFERENCES: [&str; 30] = [
-    "actuator",
-    "body",
-    "body1",
-    "body2",
-    "cranksite",
-    "geom",
-    "geom1",
-    "geom2",
-    "hfield",
-    "instance",
-    "joint",
-    "joint1",
-    "joint2",
-    "jointinparent",
-    "material",
-    "mesh",
-    "name",
-    "objname",
-    "refname",
-    "refsite",
-    "sidesite",
-    "site",
-    "site1",
-    "site2",
-    "slidersite",
-    "target",
-    "tendon",
-    "tendon1",
-    "tendon2",
-    "texture",
+/// Sections whose elements may refer to something that is not attached. Those to which others refer come first.
+const WITH_REFERENCES: [&str; 3] = ["tendon", "equality", "actuator"];
+/// Attributes that refer to an element by its name, with the kind of this element.
+const REFERENCES: [(&str, &str); 25] = [
+    ("actuator", "actuator"),
+    ("body", "body"),
+    ("body1", "body"),
+    ("body2", "body"),
+    ("cranksite", "site"),
+    ("geom", "geom"),
+    ("geom1", "geom"),
+    ("geom2", "geom"),
+    ("hfield", "hfield"),
+    ("instance", "instance"),
+    ("joint", "joint"),
+    ("joint1", "joint"),
+    ("joint2", "joint"),
+    ("jointinparent", "joint"),
+    ("material", "material"),
+    ("mesh", "mesh"),
+    ("refsite", "site"),
+    ("sidesite", "site"),
+    ("site", "site"),
+    ("site1", "site"),
+    ("site2", "site"),
+    ("slidersite", "site"),
+    ("tendon", "tendon"),
+    ("tendon1", "tendon"),
+    ("tendon2", "tendon"),
 ];
+/// Name of a model without a name, from MuJoCo.
+const UNNAMED_MODEL: &str = "MuJoCo Model";
 /// Attributes that name a default class.
 const CLASSES: [&str; 2] = ["class", "childclass"];
 
@@ -84,7 +83,14 @@ const CLASSES: [&str; 2] = ["class", "childclass"];
 ///
 /// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
 pub fn expand_other_files(text: &str, read: FileReader) -> Result<String, String> {
-    AttachedModels { read, n_attached: 0 }.expand(text, "", NestingLevel::top(DEEPEST))
+    let mut models = AttachedModels {
+        read,
+        n_attached: 0,
+        n_parsed: 0,
+        expanded: BTreeMap::new(),
+        unfinished: Vec::new(),
+    };
+    models.expand(text, "", NestingLevel::top(DEEPEST))
 }
 
 /// Reads and counts attached models.
@@ -93,6 +99,12 @@ struct AttachedModels<'a> {
     read: FileReader<'a>,
     /// Number of models attached so far.
     n_attached: usize,
+    /// Number of bytes parsed so far.
+    n_parsed: usize,
+    /// Texts of files with all that they include and attach, by their paths relative to the main file.
+    expanded: BTreeMap<String, String>,
+    /// Paths of the files that are being expanded.
+    unfinished: Vec<String>,
 }
 
 /// What is attached of a model, and under which names.
@@ -109,8 +121,8 @@ struct AttachedModel<'a, 'i> {
     root: Node<'a, 'i>,
     /// The body or frame that is attached; none attaches all of the world.
     part: Option<Node<'a, 'i>>,
-    /// Names of bodies, joints, sites and the like that are not attached.
-    missing: BTreeSet<&'a str>,
+    /// Bodies, joints, sites and the like that are not attached: kind and name.
+    missing: BTreeSet<(&'a str, &'a str)>,
 }
 
 impl AttachedModels<'_> {
@@ -118,7 +130,7 @@ impl AttachedModels<'_> {
     /// empty.
     fn expand(&mut self, text: &str, folder: &str, level: NestingLevel) -> Result<String, String> {
         let read = self.read;
-        let text = expand_includes(text, &|name| read(&format!("{folder}{name}")))?;
+        let text = expand_includes(text, &|name| read(&joined_path(folder, name)))?;
         // Faults of the text are reported by the import.
         if !text.contains("<attach") || check_xml_budget(&text).is_err() {
             return Ok(text);
@@ -130,37 +142,40 @@ impl AttachedModels<'_> {
         if root.tag_name().name() != "mujoco" {
             return Ok(text);
         }
-        let mut files = self.model_files(&root, folder)?;
+        let paths = self.model_paths(&root, folder)?;
         let mut classes: BTreeSet<String> = class_names(&root).map(str::to_owned).collect();
+        classes.insert(MAIN_CLASS.to_owned());
         // The elements at their places, and the sections of the attached models.
         let (mut elements, mut sections) = (Vec::new(), String::new());
+        let mut size = text.len();
         for node in root.descendants().filter(|node| node.has_tag_name("attach")) {
-            let name = required_attribute(&node, "model")?;
-            let Some(file) = files.get_mut(&name) else {
+            let Some(name) = node.attribute("model") else {
+                let says = "it needs the attribute `model`; parts of the same model are not attached here: save the complete \
+                            model with MuJoCo (mj_saveLastXML)";
+                return Err(located_message(&node, says));
+            };
+            let Some(path) = paths.get(name) else {
                 let says = format!("there is no <model> with the name `{name}` in <asset>");
                 return Err(located_message(&node, &says));
             };
-            let in_file = |fault: String| located_message(&node, &format!("in `{}`: {fault}", file.path));
-            let inside = level.enter().map_err(|fault| in_file(fault.to_string()))?;
-            // A file is expanded once, however often it is attached.
-            let whole = match &file.expanded {
-                Some(whole) => whole.clone(),
-                None => self
-                    .expand(&file.text, folder_of(&file.path), inside)
-                    .map_err(in_file)?,
-            };
-            check_xml_budget(&whole).map_err(in_file)?;
+            let whole = self.expanded_file(&node, path, level)?;
+            let in_file = |fault: String| located_message(&node, &format!("in `{path}`: {fault}"));
+            self.n_parsed += whole.len();
+            if self.n_parsed > MOST_PARSED {
+                return Err(located_message(&node, "the attached models are too large together"));
+            }
             let inner =
                 Document::parse(&whole).map_err(|fault| in_file(format!("it is not readable XML ({fault})")))?;
-            let attached = self.attached_model(&node, &inner, &file.path, &classes)?;
-            classes.extend(class_names(&attached.root).map(|class| format!("{}{class}", attached.class_prefix)));
-            elements.push((node.range(), attached.element()));
-            sections.push_str(&attached.sections());
-            file.expanded = Some(whole);
-            let size = text.len() + sections.len() + elements.iter().map(|(_, text)| text.len()).sum::<usize>();
+            let attached = self.attached_model(&node, &inner, path, &classes)?;
+            let own = class_names(&attached.root).chain([MAIN_CLASS]);
+            classes.extend(own.map(|class| attached.class(class)));
+            let (element, of_sections) = (attached.element(), attached.sections());
+            size += element.len() + of_sections.len();
             if size > LARGEST_DESCRIPTION {
                 return Err(located_message(&node, "with this model the description is too large"));
             }
+            elements.push((node.range(), element));
+            sections.push_str(&of_sections);
         }
         // Sections are added at the end of the root, on its last line.
         let mut out = String::new();
@@ -177,26 +192,50 @@ impl AttachedModels<'_> {
         Ok(out)
     }
 
-    /// The files of `<model>` in `<asset>` by their names: that of the entry, or that in the file.
-    fn model_files(&self, root: &Node, folder: &str) -> Result<BTreeMap<String, ModelFile>, String> {
+    /// The text of an attached file with all that it includes and attaches. A file is expanded once, however often it is
+    /// attached.
+    fn expanded_file(&mut self, node: &Node, path: &str, level: NestingLevel) -> Result<String, String> {
+        if let Some(whole) = self.expanded.get(path) {
+            return Ok(whole.clone());
+        }
+        if self.unfinished.iter().any(|one| one == path) {
+            return Err(located_message(node, &format!("`{path}` attaches itself")));
+        }
+        let in_file = |fault: String| located_message(node, &format!("in `{path}`: {fault}"));
+        let inside = level.enter().map_err(|fault| in_file(fault.to_string()))?;
+        let text = (self.read)(path).map_err(|fault| located_message(node, &fault))?;
+        self.unfinished.push(path.to_owned());
+        let whole = self.expand(&text, folder_of(path), inside).map_err(in_file)?;
+        self.unfinished.pop();
+        check_xml_budget(&whole).map_err(in_file)?;
+        self.expanded.insert(path.to_owned(), whole.clone());
+        Ok(whole)
+    }
+
+    /// The paths of `<model>` in `<asset>` by their names: that of the entry, or that in the file. Entries of an included
+    /// file are relative to its folder.
+    fn model_paths(&mut self, root: &Node, folder: &str) -> Result<BTreeMap<String, String>, String> {
         let mut out = BTreeMap::new();
         let entries = children(root, "asset").flat_map(|asset| children(&asset, "model").collect::<Vec<_>>());
         for entry in entries {
-            let path = format!("{folder}{}", required_attribute(&entry, "file")?);
-            let text = (self.read)(&path).map_err(|fault| located_message(&entry, &fault))?;
+            let file = required_attribute(&entry, "file")?;
+            let of_include = entry.attribute(FILE_FOLDER).unwrap_or_default();
+            let path = joined_path(folder, &joined_path(of_include, &file));
             let name = match entry.attribute("name") {
                 Some(name) => name.to_owned(),
                 None => {
+                    let text = (self.read)(&path).map_err(|fault| located_message(&entry, &fault))?;
+                    self.n_parsed += text.len();
+                    if self.n_parsed > MOST_PARSED {
+                        return Err(located_message(&entry, "the attached models are too large together"));
+                    }
                     let parsed = check_xml_budget(&text).ok().and_then(|()| Document::parse(&text).ok());
                     let name =
                         parsed.and_then(|document| document.root_element().attribute("model").map(str::to_owned));
-                    name.ok_or_else(|| {
-                        located_message(&entry, "neither this element nor the model in its file has a name")
-                    })?
+                    name.unwrap_or_else(|| UNNAMED_MODEL.to_owned())
                 }
             };
-            let expanded = None;
-            out.entry(name).or_insert(ModelFile { path, text, expanded });
+            out.entry(name).or_insert(path);
         }
         Ok(out)
     }
@@ -214,10 +253,10 @@ impl AttachedModels<'_> {
         };
         let root = inner.root_element();
         if root.tag_name().name() != "mujoco" {
-            return Err(located_message(
-                node,
-                &format!("`{path}` is no MJCF: only such models can be attached"),
-            ));
+            let says = format!(
+                "`{path}` is no MJCF; other formats are not attached here: save the complete model with MuJoCo (mj_saveLastXML)"
+            );
+            return Err(located_message(node, &says));
         }
         // A body or a frame can be attached alone.
         let mut part = None;
@@ -251,15 +290,6 @@ impl AttachedModels<'_> {
     }
 }
 
-/// A file in `<asset>`.
-struct ModelFile {
-    /// Its name relative to the folder of the main file.
-    path: String,
-    text: String,
-    /// Its text with all that it includes and attaches.
-    expanded: Option<String>,
-}
-
 /// The names of all default classes.
 fn class_names<'a>(root: &Node<'a, '_>) -> impl Iterator<Item = &'a str> {
     let defaults = root.descendants().filter(|node| node.has_tag_name("default"));
@@ -272,18 +302,18 @@ impl<'a> AttachedModel<'a, '_> {
         let Some(part) = self.part else {
             return;
         };
-        let names = |node: Node<'a, '_>| -> BTreeSet<&'a str> {
-            let all = node.descendants().filter(|inner| !inner.has_tag_name("key"));
-            all.filter_map(|inner| inner.attribute("name")).collect()
+        let names = |node: Node<'a, '_>| -> BTreeSet<(&'a str, &'a str)> {
+            let named = |inner: Node<'a, '_>| Some((named_kind(&inner), inner.attribute("name")?));
+            node.descendants().filter_map(named).collect()
         };
-        let world = children(&self.root, "worldbody").flat_map(|world| names(world));
+        let world = children(&self.root, "worldbody").flat_map(names);
         let kept = names(part);
         self.missing = world.filter(|name| !kept.contains(name)).collect();
         // A tendon that is left out takes its actuators with it.
         for section in WITH_REFERENCES.iter().flat_map(|tag| children(&self.root, tag)) {
             for node in section.children().filter(Node::is_element) {
-                if self.is_left_out(&node) {
-                    self.missing.extend(node.attribute("name"));
+                if let Some(name) = node.attribute("name").filter(|_| self.is_left_out(&node)) {
+                    self.missing.insert((section.tag_name().name(), name));
                 }
             }
         }
@@ -292,11 +322,10 @@ impl<'a> AttachedModel<'a, '_> {
     /// Whether an element, or one inside it, refers to something that is not attached.
     fn is_left_out(&self, node: &Node) -> bool {
         let refers = |inner: Node| {
-            let references = inner
+            let mut references = inner
                 .attributes()
-                .filter(|a| a.name() != "name" && REFERENCES.contains(&a.name()));
-            let mut values = references.map(|a| a.value());
-            values.any(|name| self.missing.contains(name))
+                .filter_map(|a| Some((referred_kind(a.name())?, a.value())));
+            references.any(|one| self.missing.contains(&one))
         };
         !self.missing.is_empty() && node.descendants().filter(Node::is_element).any(refers)
     }
@@ -403,10 +432,10 @@ impl<'a> AttachedModel<'a, '_> {
             let (key, value) = (attribute.name(), attribute.value());
             let renamed = match key {
                 ATTACHED => self.nested_number(value),
-                FILE_FOLDER => format!("{}{value}", self.folder),
                 _ if CLASSES.contains(&key) => self.class(value),
                 // The world has no other name.
-                _ if REFERENCES.contains(&key) && value != "world" && !value.is_empty() => {
+                _ if referred_kind(key) == Some("body") && value == "world" => value.to_owned(),
+                _ if (key == "name" || referred_kind(key).is_some()) && !value.is_empty() => {
                     format!("{}{value}", self.prefix)
                 }
                 _ => value.to_owned(),
@@ -443,12 +472,26 @@ impl<'a> AttachedModel<'a, '_> {
         if is_of_section && node.attribute("class").is_none() {
             write_attribute(out, "class", &self.class(MAIN_CLASS));
         }
-        if tag == "mesh" && node.attribute("name").is_none() {
-            if let Some(file) = node.attribute("file") {
-                let name = name_of_file(file);
-                write_attribute(out, "name", &format!("{}{name}", self.prefix));
-            }
+        if let ("mesh", None, Some(file)) = (tag, node.attribute("name"), node.attribute("file")) {
+            let name = name_of_file(file);
+            write_attribute(out, "name", &format!("{}{name}", self.prefix));
         }
+    }
+}
+
+/// The kind of element to which an attribute refers; `None` if it does not refer to one.
+fn referred_kind(key: &str) -> Option<&'static str> {
+    REFERENCES
+        .iter()
+        .find(|(attribute, _)| *attribute == key)
+        .map(|(_, kind)| *kind)
+}
+
+/// The kind of a named element in the tree of bodies.
+fn named_kind<'a>(node: &Node<'a, '_>) -> &'a str {
+    match node.tag_name().name() {
+        "freejoint" => "joint",
+        tag => tag,
     }
 }
 
@@ -468,17 +511,4 @@ fn write_attribute(out: &mut String, key: &str, value: &str) {
     let _ = write!(out, " {key}=\"");
     write_escaped(out, value);
     out.push('"');
-}
-
-/// Writes the value of an attribute; line breaks become blanks, as a parser of XML reads them.
-fn write_escaped(out: &mut String, value: &str) {
-    for letter in value.chars() {
-        match letter {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '"' => out.push_str("&quot;"),
-            '\n' | '\r' | '\t' => out.push(' '),
-            other => out.push(other),
-        }
-    }
 }

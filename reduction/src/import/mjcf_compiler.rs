@@ -65,12 +65,12 @@ impl<'a> CompilerSettings<'a> {
     }
 
     /// The settings of the description itself.
-    pub(super) fn main(&self) -> &MjcfCompiler {
+    pub(super) fn main_settings(&self) -> &MjcfCompiler {
         &self.main
     }
 
     /// The settings of the file to which an element belongs.
-    pub(super) fn of(&self, node: &Node) -> &MjcfCompiler {
+    pub(super) fn find_settings(&self, node: &Node) -> &MjcfCompiler {
         if self.attached.is_empty() {
             return &self.main;
         }
@@ -154,7 +154,7 @@ fn read_compiler(all: &[Node]) -> Result<MjcfCompiler, String> {
         // Poses relative to the world have another meaning, so the file cannot be read.
         if node.attribute("coordinate") == Some("global") {
             return Err(located_message(
-                &node,
+                node,
                 "global coordinates were removed from MuJoCo in version 2.3.3; convert the file with an older version",
             ));
         }

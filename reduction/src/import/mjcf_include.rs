@@ -5,15 +5,20 @@
 //! relative to the folder of the main file. MuJoCo 4 reads a file that is not there relative to the folder of the
 //! including file.
 
-use modelmill_boundary::nesting::NestingLevel;
-use roxmltree::Document;
+use std::fmt::Write as _;
 
-use super::xml::{located_message, required_attribute};
+use modelmill_boundary::nesting::NestingLevel;
+use roxmltree::{Document, Node};
+
+use super::xml::{located_message, required_attribute, write_escaped};
 use super::xml_budget::check_xml_budget;
 use super::xml_repair::readable_xml;
 
 /// Gives the text of a file by its name; fails with a sentence.
 pub type FileReader<'a> = &'a dyn Fn(&str) -> Result<String, String>;
+
+/// Attribute of elements that name files: the folder of the file with the element, relative to that of the main file.
+pub(super) const FILE_FOLDER: &str = "modelmill-folder";
 
 /// Largest depth of nested includes.
 const DEEPEST: usize = 20;
@@ -58,7 +63,7 @@ fn expand_file(
         let name = required_attribute(&node, "file")?;
         let (mut place, mut other) = (name.clone(), read(&name));
         if other.is_err() && !folder.is_empty() {
-            let beside = format!("{folder}{name}");
+            let beside = joined_path(folder, &name);
             if let Ok(text) = read(&beside) {
                 (place, other) = (beside, Ok(text));
             }
@@ -85,8 +90,8 @@ fn expand_file(
         let range = node.range();
         // The children of its root, without line breaks.
         out.push_str(&text[from..range.start]);
-        for child in children.filter(roxmltree::Node::is_element) {
-            out.push_str(&whole[child.range()].replace(['\n', '\r'], " "));
+        for child in children.filter(Node::is_element) {
+            push_included(&mut out, &whole, &child, &folder_of_other);
         }
         from = range.end;
     }
@@ -97,4 +102,30 @@ fn expand_file(
 /// The folder of a path, with the slash at its end; empty for a file without one.
 pub(super) fn folder_of(path: &str) -> &str {
     &path[..path.rfind('/').map_or(0, |slash| slash + 1)]
+}
+
+/// Adds an element of an included file, without line breaks. A `<model>` is relative to the folder of this file.
+fn push_included(out: &mut String, text: &str, child: &Node, folder: &str) {
+    let mut from = child.range().start;
+    let models = child
+        .descendants()
+        .filter(|node| node.has_tag_name("model") && !node.has_attribute(FILE_FOLDER));
+    for model in models.filter(|_| !folder.is_empty() && child.has_tag_name("asset")) {
+        let to = model.range().start + "<model".len();
+        out.push_str(&text[from..to].replace(['\n', '\r'], " "));
+        let _ = write!(out, " {FILE_FOLDER}=\"");
+        write_escaped(out, folder);
+        out.push('"');
+        from = to;
+    }
+    out.push_str(&text[from..child.range().end].replace(['\n', '\r'], " "));
+}
+
+/// The path of a file whose name is relative to a folder, unless it is absolute.
+pub(super) fn joined_path(folder: &str, file: &str) -> String {
+    if file.starts_with('/') {
+        file.to_owned()
+    } else {
+        format!("{folder}{file}")
+    }
 }

@@ -12,7 +12,7 @@ use super::description::DescriptionInertia;
 use super::geoms::GIVE_INERTIAL;
 use super::meshes::{MeshInertia, TriangleMesh};
 use super::mjcf::MjcfReader;
-use super::mjcf_attach::FILE_FOLDER;
+use super::mjcf_include::FILE_FOLDER;
 use super::placed::{DescriptionPose, rotation_from_quaternion};
 use super::xml::{located_message, numbers, vector};
 
@@ -48,9 +48,9 @@ impl MeshFolder {
         }
     }
 
-    /// The path of a mesh file relative to the description.
-    fn path(&self, file: &str) -> String {
-        let file = if self.strips_paths { last_part(file) } else { file };
+    /// The path of a mesh file relative to the description. Whether paths are cut down is a setting of the `main` file.
+    fn path(&self, file: &str, main: &Self) -> String {
+        let file = if main.strips_paths { last_part(file) } else { file };
         let own = &self.file_folder;
         match self.folder.trim_end_matches('/') {
             _ if file.starts_with('/') => file.to_owned(),
@@ -138,7 +138,8 @@ impl<'a> MjcfReader<'a> {
             let says = "the file of this mesh can only be read if the description is given as a file";
             return Err(located_message(entry, says));
         };
-        let path = self.settings_of(entry).mesh_folder.path(file);
+        let main = &self.settings.main_settings().mesh_folder;
+        let path = self.settings_of(entry).mesh_folder.path(file, main);
         let bytes = read(&path).map_err(|fault| located_message(entry, &fault))?;
         TriangleMesh::read(&path, &bytes).map_err(|fault| located_message(entry, &format!("`{path}`: {fault}")))
     }

@@ -128,3 +128,16 @@ pub(crate) fn located_message(node: &Node, fault: &str) -> String {
         .map_or_else(String::new, |name| format!(" `{name}`"));
     format!("line {}, <{}>{name}: {fault}", line(node), node.tag_name().name())
 }
+
+/// Writes the value of an attribute; line breaks become blanks, as a parser of XML reads them.
+pub(super) fn write_escaped(out: &mut String, value: &str) {
+    for letter in value.chars() {
+        match letter {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '"' => out.push_str("&quot;"),
+            '\n' | '\r' | '\t' => out.push(' '),
+            other => out.push(other),
+        }
+    }
+}

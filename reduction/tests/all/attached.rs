@@ -1,7 +1,9 @@
 //! Models that an MJCF attaches: the import is that of the complete model which MuJoCo 4.0 makes of the files (saved with
 //! `mj_saveLastXML`, with all digits and with the settings of each compiler).
 
-use modelmill_reduction::{ImportOptions, expand_other_files, import};
+use std::cell::RefCell;
+
+use modelmill_reduction::{ImportOptions, MeshFiles, expand_other_files, import};
 
 /// Shapes outside of bodies, two classes, a compiler in rad, a coupling, a tendon, and actuators.
 const CHILD: &str = r#"<mujoco model="child">
@@ -176,7 +178,7 @@ fn what_cannot_be_attached_is_refused_with_its_place() {
             "no <model> with the name `other`",
         ),
         (r#"<attach model="ch"/>"#, "needs the attribute `prefix`"),
-        (r#"<attach prefix=""/>"#, "needs the attribute `model`"),
+        (r#"<attach body="b" prefix=""/>"#, "needs the attribute `model`"),
         (
             r#"<attach model="ch" body="b9" prefix=""/>"#,
             "`sub/child.xml` has no body `b9`",
@@ -189,7 +191,10 @@ fn what_cannot_be_attached_is_refused_with_its_place() {
     let text = r#"<mujoco model="m"><asset><model name="m" file="m.xml"/></asset>
 <worldbody><attach model="m" prefix="a"/></worldbody></mujoco>"#;
     let found = expand_other_files(text, &|_| Ok(text.to_owned())).unwrap_err();
-    assert!(found.starts_with("line 2") && found.len() < 4000, "{found}");
+    assert!(
+        found.starts_with("line 2") && found.contains("`m.xml` attaches itself"),
+        "{found}"
+    );
     // Text without files.
     let found = import(&parent(r#"<attach model="ch" prefix=""/>"#), &ImportOptions::default());
     let found = found.unwrap_err().to_string();
@@ -197,4 +202,92 @@ fn what_cannot_be_attached_is_refused_with_its_place() {
         found.contains("can only be read if the description is given as a file"),
         "{found}"
     );
+}
+
+#[test]
+fn classes_of_different_models_never_mix() {
+    // Without a prefix both models have a main class and a class `c`.
+    let child = r#"<mujoco><default><joint damping=".7"/><default class="c"><joint frictionloss=".1"/></default></default>
+        <worldbody><body name="b"><joint name="j"/><joint name="k" axis="1 0 0" class="c"/><geom size=".1"/></body></worldbody></mujoco>"#;
+    let text = r#"<mujoco model="two">
+  <default><joint frictionloss="2"/><default class="c"><joint damping="5"/></default></default>
+  <asset><model name="ch" file="child.xml"/></asset>
+  <worldbody><body name="r"><joint name="jr"/><joint name="kr" axis="1 0 0" class="c"/><geom size=".1"/>
+    <attach model="ch" prefix=""/></body></worldbody></mujoco>"#;
+    let whole = expand_other_files(text, &|_| Ok(child.to_owned())).unwrap();
+    let model = import(&whole, &ImportOptions::default()).unwrap().model;
+    let by_hand = r#"<mujoco model="two"><worldbody><body name="r">
+        <joint name="jr" frictionloss="2"/><joint name="kr" axis="1 0 0" frictionloss="2" damping="5"/><geom size=".1"/>
+        <body name="b"><joint name="j" damping=".7"/><joint name="k" axis="1 0 0" damping=".7" frictionloss=".1"/>
+        <geom size=".1"/></body></body></worldbody></mujoco>"#;
+    assert_eq!(without_places(&model), expected(by_hand));
+}
+
+#[test]
+fn elements_are_left_out_by_kind_and_name() {
+    // The tendon has the name of a body that is not attached, the joint that of a body which is.
+    let child = r#"<mujoco><worldbody>
+        <body name="t"><joint name="b"/><geom size=".1"/></body>
+        <body name="b"><joint name="world"/><geom size=".1"/></body></worldbody>
+        <tendon><fixed name="t"><joint joint="world" coef="2"/></fixed></tendon>
+        <actuator><motor name="m" tendon="t"/><motor name="n" joint="b"/></actuator></mujoco>"#;
+    let text = r#"<mujoco model="one"><asset><model name="ch" file="child.xml"/></asset>
+        <worldbody><attach model="ch" body="b" prefix="x_"/></worldbody></mujoco>"#;
+    let whole = expand_other_files(text, &|_| Ok(child.to_owned())).unwrap();
+    let model = import(&whole, &ImportOptions::default()).unwrap().model;
+    let by_hand = r#"<mujoco model="one"><worldbody><body name="x_b"><joint name="x_world"/><geom size=".1"/></body></worldbody>
+        <tendon><fixed name="x_t"><joint joint="x_world" coef="2"/></fixed></tendon>
+        <actuator><motor name="x_m" tendon="x_t"/></actuator></mujoco>"#;
+    assert_eq!(without_places(&model), expected(by_hand));
+}
+
+#[test]
+fn files_are_relative_to_the_file_that_names_them() {
+    // The main file includes `s/assets.xml`, whose model is `s/m.xml`, which attaches `s/deep/c.xml` with a mesh.
+    let body = r#"<body name="b"><joint/><geom type="mesh" mesh="q"/></body>"#;
+    let files = |name: &str| match name {
+        "s/assets.xml" => Ok("<mujoco><asset><model name=\"m\" file=\"m.xml\"/></asset></mujoco>".to_owned()),
+        "s/m.xml" => Ok("<mujoco><compiler meshdir=\"no\" strippath=\"true\"/>\
+                         <asset><model name=\"c\" file=\"deep/c.xml\"/></asset>\
+                         <worldbody><attach model=\"c\" prefix=\"\"/></worldbody></mujoco>"
+            .to_owned()),
+        "s/deep/c.xml" => Ok(format!(
+            "<mujoco><compiler meshdir=\"shapes\"/><asset><mesh file=\"parts/q.obj\"/></asset><worldbody>{body}</worldbody></mujoco>"
+        )),
+        other => Err(format!("{other} is not there")),
+    };
+    let text = r#"<mujoco><include file="s/assets.xml"/><worldbody><attach model="m" prefix=""/></worldbody></mujoco>"#;
+    let whole = expand_other_files(text, &files).unwrap();
+    let asked = RefCell::new(Vec::new());
+    let read_mesh = |name: &str| {
+        asked.borrow_mut().push(name.to_owned());
+        Err("no meshes here".to_owned())
+    };
+    let options = ImportOptions {
+        meshes: Some(MeshFiles(&read_mesh)),
+        ..ImportOptions::default()
+    };
+    let fault = import(&whole, &options).unwrap_err().to_string();
+    assert!(fault.contains("no meshes here"), "{fault}");
+    assert_eq!(asked.into_inner(), ["s/deep/shapes/parts/q.obj"]);
+}
+
+#[test]
+fn nested_models_have_a_limit() {
+    // Each file attaches the next one twice, under two names.
+    let files = |name: &str| {
+        let next: usize = name.trim_end_matches(".xml").parse::<usize>().expect("a number") + 1;
+        let attach = |k: usize| format!("<attach model=\"m{k}\" prefix=\"{k}\"/>");
+        let model = |k: usize| format!("<model name=\"m{k}\" file=\"{next}.xml\"/>");
+        Ok(format!(
+            "<mujoco><asset>{}{}</asset><worldbody><body name=\"b\">{}{}</body></worldbody></mujoco>",
+            model(1),
+            model(2),
+            if next < 19 { attach(1) } else { String::new() },
+            if next < 19 { attach(2) } else { String::new() },
+        ))
+    };
+    let main = files("0.xml").unwrap();
+    let fault = expand_other_files(&main, &files).unwrap_err();
+    assert!(fault.contains("more than") || fault.contains("too large"), "{fault}");
 }

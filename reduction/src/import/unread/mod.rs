@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node};
 
-use super::mjcf_attach::{ATTACHED, FILE_FOLDER};
+use super::mjcf_attach::ATTACHED;
+use super::mjcf_include::FILE_FOLDER;
 use super::xml::line;
 
 /// An element and what may stand in it. Words are separated by blanks. A word `name=a,b` is without effect only if the
