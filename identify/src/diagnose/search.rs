@@ -610,9 +610,12 @@ impl EffectSelector<'_> {
             }
             let news = set_difference(&trial.picks, accepted);
             let channels = self.affected_channels(&news);
-            // Twice the logarithm of the likelihood ratio must be small.
+            // Twice the logarithm of the likelihood ratio must be small, with all channels as one and channel by
+            // channel: a set that explains other channels is no simpler explanation of these.
             let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
-            if chosen.1.effective_samples * ratio.ln() > SIMPLER_SET_MOST_LOSS {
+            if chosen.1.effective_samples * ratio.ln() > SIMPLER_SET_MOST_LOSS
+                || self.likelihood_loss(&chosen.0.picks, &trial.picks) > SIMPLER_SET_MOST_LOSS
+            {
                 continue;
             }
             let own = self.evidence(accepted, &trial.picks, &channels);
@@ -621,6 +624,24 @@ impl EffectSelector<'_> {
             }
         }
         (chosen.0.picks, chosen.1)
+    }
+
+    /// Twice the logarithm of the likelihood ratio of two sets, each channel with the variance that the set leaves there;
+    /// positive if `better` is more likely than `other`.
+    fn likelihood_loss(&self, better: &[SelectedEffect], other: &[SelectedEffect]) -> f64 {
+        let [better, other] = [better, other].map(|picks| {
+            let (factors, _) = self.fit(picks, FitScope::All);
+            self.residual(picks, &factors)
+        });
+        let variance = |rest: &[Vec<f64>], d: usize| {
+            let noise = self.problem.noise[d].powi(2).max(f64::MIN_POSITIVE);
+            self.pool.mean_square(d, &rest[d]).max(noise)
+        };
+        let losses = (0..better.len()).map(|d| {
+            let ratio = variance(&other, d) / variance(&better, d);
+            self.effective_equations(&better, &[d]) * ratio.ln()
+        });
+        losses.sum()
     }
 
     /// Members of the accepted set that are not in `picks`.

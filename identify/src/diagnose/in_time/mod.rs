@@ -156,19 +156,21 @@ fn find_change(
     let mut columns = Vec::new();
     let mut intervals = Vec::new();
     let mut explained = 0.0;
+    let mut searched_constants = 0;
     // The set is fitted again to all recordings, so that a change in one lowers the squares of the others too.
     let all = 0..products.recordings.len();
     let mut remaining: f64 = all.map(|r| products.residual_squares(k, r)).sum();
     let times = problem.layout.times();
-    for (r, recording) in products.recordings.iter().enumerate() {
-        let Some(best) = best_profile(products, k, r) else {
-            continue;
-        };
+    let bests = (0..products.recordings.len()).map(|r| best_profile(products, k, r));
+    let bests = needed_profiles(products, k, bests.collect());
+    for (r, (recording, best)) in products.recordings.iter().zip(bests).enumerate() {
+        let Some(best) = best else { continue };
         let samples = products.refine_times(k, r, &best.profile);
         if is_signal_at_standstill(problem, shape, &recording.samples, &samples) {
             continue;
         }
         explained += best.gain;
+        searched_constants += best.profile.searched_times();
         remaining -= best.gain + best.of_level;
         let last = recording.samples.end - 1;
         intervals.push(ChangeInterval {
@@ -188,9 +190,7 @@ fn find_change(
     (!columns.is_empty()).then(|| FoundChange {
         candidate: CandidateEffect {
             effect: shape.effect.clone(),
-            // A change that lasts has one searched time, one that ends has two. Each is the best of as many times as
-            // there are effective samples: as for the best of many candidates, this costs twice their logarithm.
-            searched_constants: intervals.iter().map(|one| if one.lasts { 2 } else { 4 }).sum(),
+            searched_constants,
             parameters,
             is_part_of_load: false,
             refines: None,
@@ -234,6 +234,51 @@ fn is_signal_at_standstill(
         || !moves_within(&mut recording.clone().filter(|i| !is_changed(i)))
 }
 
+/// The profiles, `[recording]`, that are needed beside those of the other recordings: a large change in one recording
+/// falsifies the fit of all, so that each of them seems to have one.
+fn needed_profiles(
+    products: &BlockProducts<'_>,
+    shape: usize,
+    mut bests: Vec<Option<BestProfile>>,
+) -> Vec<Option<BestProfile>> {
+    let gain = |best: &Option<BestProfile>| best.as_ref().map_or(0.0, |best| best.gain);
+    let mut order: Vec<usize> = (0..bests.len()).filter(|r| bests[*r].is_some()).collect();
+    if order.len() < 2 {
+        return bests;
+    }
+    order.sort_by(|a, b| gain(&bests[*b]).total_cmp(&gain(&bests[*a])));
+    let reduced = products.reduce_blocks(shape, 0..bests.len());
+    let counts: Vec<usize> = products.recordings.iter().map(|cut| cut.blocks.len()).collect();
+    // Values of one recording with zeros for all others.
+    let spread = |r: usize, values: Vec<f64>| {
+        let [before, after] = [&counts[..r], &counts[r + 1..]].map(|counts| vec![0.0; counts.iter().sum()]);
+        [before, values, after].concat()
+    };
+    let all = 0..bests.len();
+    let total: f64 = all.clone().map(|r| products.residual_squares(shape, r)).sum();
+    let worth: f64 = all.map(|r| products.effective_samples(shape, r)).sum();
+    let parameters = products.shape_columns(shape).len();
+    let mut accepted: Vec<Vec<f64>> = Vec::new();
+    for r in order {
+        let Some(best) = &bests[r] else { continue };
+        let level = spread(r, vec![1.0; counts[r]]);
+        let change = spread(r, best.profile.values(counts[r]));
+        let remaining = |further: &[&Vec<f64>]| {
+            let profiles: Vec<&[f64]> = accepted.iter().chain(further.iter().copied()).map(Vec::as_slice).collect();
+            (total - reduced.explained_squares(&profiles)).max(f64::MIN_POSITIVE)
+        };
+        // Twice the decrease of the logarithm of the likelihood must exceed the price of its parameters and times.
+        let gain = worth * (remaining(&[&level]) / remaining(&[&level, &change])).ln();
+        let numbers = parameters + best.profile.searched_times();
+        if accepted.is_empty() || gain > numbers as f64 * worth.ln() {
+            accepted.push(change);
+        } else {
+            bests[r] = None;
+        }
+    }
+    bests
+}
+
 /// The step or interval of a shape that explains most in a recording.
 struct BestProfile {
     /// Weighted squares that it explains in addition to a constant level of the recording.
@@ -250,7 +295,7 @@ fn best_profile(products: &BlockProducts<'_>, shape: usize, recording: usize) ->
     let blocks = products.recordings[recording].blocks.len();
     // The level of the recording is free, since the other recordings may have changes too.
     let level = vec![1.0; blocks];
-    let reduced = products.reduce_blocks(shape, recording);
+    let reduced = products.reduce_blocks(shape, recording..recording + 1);
     let of_level = reduced.explained_squares(&[&level]);
     let explained = |values: &[f64]| reduced.explained_squares(&[&level, values]) - of_level;
     let best = |profiles: &mut dyn Iterator<Item = TimeProfile>| {

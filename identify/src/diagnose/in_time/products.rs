@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::column::ForceColumn;
 use super::super::factored::GramFactor;
+use super::super::noise::effective_samples;
 use super::super::pool::solve_gram;
 use super::super::problem::DiagnosisProblem;
 use super::profile::TimeProfile;
@@ -46,6 +47,8 @@ pub(super) struct CutRecording {
     products: Vec<DMatrix<f64>>,
     /// Weighted squares of the residual of the set by channel.
     squares: Vec<f64>,
+    /// Effective number of samples of that residual by channel.
+    effective_samples: Vec<f64>,
 }
 
 /// The products of a shape in one block, with the set projected out.
@@ -58,7 +61,7 @@ struct ReducedBlock {
     halves: DMatrix<f64>,
 }
 
-/// The same for all blocks of a recording.
+/// The same for all blocks of one or more recordings.
 pub(super) struct ReducedBlocks {
     /// The blocks.
     blocks: Vec<ReducedBlock>,
@@ -202,6 +205,8 @@ impl<'a> BlockProducts<'a> {
             let squares = squares.collect();
             let recording = &mut one.recordings[r];
             (recording.products, recording.squares) = (products, squares);
+            let parts = rest.iter().map(|rest| effective_samples(&rest[samples.clone()]));
+            recording.effective_samples = parts.collect();
         }
         Some(one)
     }
@@ -213,16 +218,26 @@ impl<'a> BlockProducts<'a> {
 
     /// Weighted squares of the residual of a recording on the channels on which a shape acts.
     pub(super) fn residual_squares(&self, shape: usize, recording: usize) -> f64 {
-        let squares = self.recordings[recording].squares.iter().enumerate();
-        let acts = |d: usize| self.shapes[shape].iter().any(|column| column.0[d].is_some());
-        squares.filter(|(d, _)| acts(*d)).map(|(_, squares)| squares).sum()
+        self.sum_on_channels(shape, &self.recordings[recording].squares)
     }
 
-    /// The blocks of a recording for one shape, with the set projected out.
-    pub(super) fn reduce_blocks(&self, shape: usize, recording: usize) -> ReducedBlocks {
+    /// Effective number of samples of the residual of a recording on the channels on which a shape acts.
+    pub(super) fn effective_samples(&self, shape: usize, recording: usize) -> f64 {
+        self.sum_on_channels(shape, &self.recordings[recording].effective_samples)
+    }
+
+    /// Sum of some values, `[channel]`, over the channels on which a shape acts.
+    fn sum_on_channels(&self, shape: usize, values: &[f64]) -> f64 {
+        let acts = |d: usize| self.shapes[shape].iter().any(|column| column.0[d].is_some());
+        let acting = values.iter().enumerate().filter(|(d, _)| acts(*d));
+        acting.map(|(_, value)| value).sum()
+    }
+
+    /// The blocks of some recordings for one shape, with the set projected out.
+    pub(super) fn reduce_blocks(&self, shape: usize, recordings: Range<usize>) -> ReducedBlocks {
         let n = self.set.len();
         let (start, p) = (self.starts[shape], self.shapes[shape].len());
-        let blocks = self.recordings[recording].products.iter();
+        let blocks = self.recordings[recordings].iter().flat_map(|cut| &cut.products);
         let blocks = blocks.map(|block| {
             let last = block.ncols() - 1;
             let with_set = block.view((0, start), (n, p)).into_owned();
@@ -247,7 +262,7 @@ impl<'a> BlockProducts<'a> {
         let values = profile.values(blocks.len());
         let level = vec![1.0; blocks.len()];
         let profiles: [&[f64]; 2] = [&values, &level];
-        let (own, _) = solve_gram(&self.reduce_blocks(shape, recording).gram(&profiles));
+        let (own, _) = solve_gram(&self.reduce_blocks(shape, recording..recording + 1).gram(&profiles));
         // The factors of the set change with those of the shape.
         let n = self.set.len();
         let p = self.shapes[shape].len();
@@ -451,6 +466,7 @@ fn cut_recordings(problem: &DiagnosisProblem) -> Vec<CutRecording> {
             samples,
             products: Vec::new(),
             squares: Vec::new(),
+            effective_samples: Vec::new(),
         }
     };
     recordings.into_iter().map(cut).collect()

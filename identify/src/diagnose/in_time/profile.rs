@@ -29,6 +29,12 @@ impl TimeProfile {
         })
     }
 
+    /// Searched constants: a change that lasts has one searched time, one that ends has two. Each is the best of as many
+    /// times as there are effective samples: as for the best of many candidates, this costs twice their logarithm.
+    pub(super) fn searched_times(self) -> usize {
+        if self.end.is_some() { 4 } else { 2 }
+    }
+
     /// 1 for blocks in which it acts, 0 for the others.
     pub(super) fn values(self, blocks: usize) -> Vec<f64> {
         let acts = |b: usize| b >= self.begin && self.end.is_none_or(|end| b < end);
