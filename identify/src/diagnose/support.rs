@@ -14,8 +14,9 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::thresholds::{
-    ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T, ODDS_PER_UNEXPLAINED, PROBABILITY_MOST,
+    CLEAR_LEAST_DEVIATIONS, ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T, ODDS_PER_UNEXPLAINED, PROBABILITY_MOST,
     SUPPORT_GAIN_RANGE, SUPPORT_GAIN_REFERENCE, SUPPORT_T_RANGE, SUPPORT_T_REFERENCE,
+    UNCLEAR_MOST_PROBABILITY,
 };
 use crate::signal::dot;
 
@@ -33,6 +34,9 @@ pub struct EffectSupport {
     pub white_residual: bool,
     /// Its share of the probability among its alternatives, 0 to 1; 1 if there are none.
     pub share: f64,
+    /// Whether one of its parameters differs from zero by more than twice its standard deviation. Terms of which none
+    /// does only cancel each other.
+    pub has_clear_value: bool,
 }
 
 impl EffectSupport {
@@ -55,7 +59,8 @@ impl EffectSupport {
             + ODDS_PER_T * (self.t.clamp(least_t, most_t) / SUPPORT_T_REFERENCE).ln()
             + ODDS_PER_GAIN * (self.gain.clamp(least_gain, most_gain) / SUPPORT_GAIN_REFERENCE).ln()
             - ODDS_PER_UNEXPLAINED * self.unexplained.max(0.0).ln_1p();
-        (1.0 / (1.0 + (-log_odds).exp())).min(PROBABILITY_MOST)
+        let most = if self.has_clear_value { PROBABILITY_MOST } else { UNCLEAR_MOST_PROBABILITY };
+        (1.0 / (1.0 + (-log_odds).exp())).min(most)
     }
 }
 
@@ -67,9 +72,10 @@ impl EffectSelector<'_> {
         aliases: &[Vec<EffectAlias>],
         left: &SetResidual,
     ) -> Vec<EffectSupport> {
-        let members = aliases.iter().enumerate();
+        let estimates = self.estimate_parameters(picks, FitScope::All);
+        let members = aliases.iter().zip(&estimates).enumerate();
         members
-            .map(|(i, aliases)| {
+            .map(|(i, (aliases, estimates))| {
                 let mut without = picks.to_vec();
                 let pick = without.remove(i);
                 let mut channels = self.affected_channels(&[pick]);
@@ -85,6 +91,7 @@ impl EffectSelector<'_> {
                     unexplained: self.unexplained_ratio(&without, &channels, left),
                     white_residual: evidence.is_residual_white,
                     share: probability_share(aliases),
+                    has_clear_value: has_clear_value(estimates),
                 }
             })
             .collect()
@@ -109,6 +116,12 @@ impl EffectSelector<'_> {
             0.0
         }
     }
+}
+
+/// Whether one of some estimates differs clearly from zero. It counts as clear if no uncertainty is known.
+fn has_clear_value(estimates: &[(f64, Option<f64>)]) -> bool {
+    let mut known = (estimates.iter()).filter_map(|(value, deviation)| Some((*value, (*deviation)?))).peekable();
+    known.peek().is_none() || known.any(|(value, deviation)| value.abs() > CLEAR_LEAST_DEVIATIONS * deviation)
 }
 
 /// How steady a gain is: over the blocks, or relative to the error of each block, whichever is steadier. A gain that is
@@ -156,6 +169,7 @@ mod tests {
                             unexplained,
                             white_residual: false,
                             share,
+                            has_clear_value: false,
                         };
                         let p = one.probability();
                         assert!((0.0..=PROBABILITY_MOST).contains(&p), "{one:?}: {p}");
@@ -174,6 +188,10 @@ mod tests {
                                 ..one
                             },
                             EffectSupport {
+                                has_clear_value: true,
+                                ..one
+                            },
+                            EffectSupport {
                                 unexplained: unexplained / 2.0,
                                 ..one
                             },
@@ -184,6 +202,14 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Terms of which none differs from zero only cancel each other; without a known uncertainty nothing is known.
+    #[test]
+    fn terms_that_only_cancel_have_no_clear_value() {
+        assert!(!has_clear_value(&[(-162.0, Some(235.0)), (921.0, Some(4020.0)), (0.0, None)]));
+        assert!(has_clear_value(&[(-162.0, Some(235.0)), (921.0, Some(40.0))]));
+        assert!(has_clear_value(&[(1.0, None)]));
     }
 
     /// An alternative takes at most as much as an equal one, however much better it fits, and another form of the same

@@ -263,6 +263,13 @@ pub(super) const SUPPORT_GAIN_RANGE: [f64; 2] = [0.005, 1.0];
 /// Largest probability of an effect: no data exclude a cause that is no candidate (1). By judgement.
 pub(super) const PROBABILITY_MOST: f64 = 0.99;
 
+/// A parameter differs clearly from zero if it exceeds this many standard deviations (1). By convention.
+pub(super) const CLEAR_LEAST_DEVIATIONS: f64 = 2.0;
+
+/// Largest probability of an effect of which no parameter differs clearly from zero (1): it is possible, but not lacking.
+/// By judgement; a cable torque on EMPS with a step of the force has such values (`lab/measured/planted.py`).
+pub(super) const UNCLEAR_MOST_PROBABILITY: f64 = 0.4;
+
 /// Below this probability an effect is possible and does not count as missing by itself (1). By definition.
 pub const LACKING_LEAST_PROBABILITY: f64 = 0.5;
 

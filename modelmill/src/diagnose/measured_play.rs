@@ -53,6 +53,7 @@ pub(crate) fn report_as_effects(model: &Model, candidates: &[CandidateEffect], d
             gain: 1.0,
             unexplained: 0.0,
             share: 1.0,
+            has_clear_value: true,
         };
         diagnosis.effects.push(IdentifiedEffect {
             effect: candidates[candidate].effect.clone(),

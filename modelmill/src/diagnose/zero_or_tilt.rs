@@ -148,6 +148,7 @@ mod tests {
                 unexplained: 0.0,
                 white_residual: true,
                 share: 1.0,
+                has_clear_value: true,
             },
             indistinguishable_from: Vec::new(),
             shared_with: Vec::new(),
