@@ -66,8 +66,8 @@ pub use motion::{
     differentiate, filter_and_differentiate,
 };
 pub use recording::{
-    ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
-    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle, display_name_of_bytes,
-    has_recording_extension, sample_place_word,
+    ColumnInfo, ColumnScaling, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError,
+    RecordingFault, RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, UnwrappedAngle,
+    display_name_of_bytes, has_recording_extension, sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER, ScaledNormalEquations, float_to_count, gram, median};

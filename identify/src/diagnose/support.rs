@@ -14,8 +14,8 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::thresholds::{
-    CLEAR_LEAST_DEVIATIONS, ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T, ODDS_PER_UNEXPLAINED, PROBABILITY_MOST,
-    SUPPORT_GAIN_RANGE, SUPPORT_GAIN_REFERENCE, SUPPORT_T_RANGE, SUPPORT_T_REFERENCE,
+    CLEAR_LEAST_DEVIATIONS, ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T, ODDS_PER_UNEXPLAINED,
+    PROBABILITY_MOST, SUPPORT_GAIN_RANGE, SUPPORT_GAIN_REFERENCE, SUPPORT_T_RANGE, SUPPORT_T_REFERENCE,
     UNCLEAR_MOST_PROBABILITY,
 };
 use crate::signal::dot;
@@ -59,7 +59,11 @@ impl EffectSupport {
             + ODDS_PER_T * (self.t.clamp(least_t, most_t) / SUPPORT_T_REFERENCE).ln()
             + ODDS_PER_GAIN * (self.gain.clamp(least_gain, most_gain) / SUPPORT_GAIN_REFERENCE).ln()
             - ODDS_PER_UNEXPLAINED * self.unexplained.max(0.0).ln_1p();
-        let most = if self.has_clear_value { PROBABILITY_MOST } else { UNCLEAR_MOST_PROBABILITY };
+        let most = if self.has_clear_value {
+            PROBABILITY_MOST
+        } else {
+            UNCLEAR_MOST_PROBABILITY
+        };
         (1.0 / (1.0 + (-log_odds).exp())).min(most)
     }
 }
@@ -120,7 +124,9 @@ impl EffectSelector<'_> {
 
 /// Whether one of some estimates differs clearly from zero. It counts as clear if no uncertainty is known.
 fn has_clear_value(estimates: &[(f64, Option<f64>)]) -> bool {
-    let mut known = (estimates.iter()).filter_map(|(value, deviation)| Some((*value, (*deviation)?))).peekable();
+    let mut known = (estimates.iter())
+        .filter_map(|(value, deviation)| Some((*value, (*deviation)?)))
+        .peekable();
     known.peek().is_none() || known.any(|(value, deviation)| value.abs() > CLEAR_LEAST_DEVIATIONS * deviation)
 }
 
@@ -207,7 +213,11 @@ mod tests {
     /// Terms of which none differs from zero only cancel each other; without a known uncertainty nothing is known.
     #[test]
     fn terms_that_only_cancel_have_no_clear_value() {
-        assert!(!has_clear_value(&[(-162.0, Some(235.0)), (921.0, Some(4020.0)), (0.0, None)]));
+        assert!(!has_clear_value(&[
+            (-162.0, Some(235.0)),
+            (921.0, Some(4020.0)),
+            (0.0, None)
+        ]));
         assert!(has_clear_value(&[(-162.0, Some(235.0)), (921.0, Some(40.0))]));
         assert!(has_clear_value(&[(1.0, None)]));
     }

@@ -29,6 +29,41 @@ impl SampleField {
     }
 }
 
+/// How the values of a column follow from one column of the file: `factor * value + offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnScaling {
+    /// Factor, in the unit of the model per unit of the file.
+    pub factor: f64,
+    /// Offset, in the unit of the model.
+    pub offset: f64,
+}
+
+impl Default for ColumnScaling {
+    fn default() -> Self {
+        Self {
+            factor: 1.0,
+            offset: 0.0,
+        }
+    }
+}
+
+impl ColumnScaling {
+    /// The scaling of values with this one that should have another: the same values of the file are read as those of
+    /// another column.
+    pub(crate) fn to(self, other: Self) -> Self {
+        let factor = other.factor / self.factor;
+        Self {
+            factor,
+            offset: other.offset - factor * self.offset,
+        }
+    }
+
+    /// A value of the file in the unit of the model.
+    pub fn scale(self, value: f64) -> f64 {
+        self.factor * value + self.offset
+    }
+}
+
 /// The numbers of a column, NaN where a field has none, and its defects.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct SignalColumn {
@@ -42,6 +77,8 @@ pub(crate) struct SignalColumn {
     pub(crate) interpolated: Vec<bool>,
     /// Values and interpolated samples before sensor faults were repaired; `None` if there were none.
     pub(crate) as_recorded: Option<(Vec<f64>, Vec<bool>)>,
+    /// How the values follow from the file, if they follow from one column of it.
+    pub(crate) scaling: ColumnScaling,
 }
 
 /// Fields of a column that cannot be used: the first of them and their number.
@@ -56,6 +93,14 @@ pub(crate) struct ColumnDefect {
 }
 
 impl SignalColumn {
+    /// Scales all values, together with those before any repair, as if the file had other values.
+    pub(crate) fn scale(&mut self, scaling: ColumnScaling) {
+        let before_repair = self.as_recorded.iter_mut().flat_map(|(values, _)| values);
+        for value in self.values.iter_mut().chain(before_repair) {
+            *value = scaling.scale(*value);
+        }
+    }
+
     /// Appends a field; `text` returns the field as it stands in the file and is called for the first defect only.
     pub(crate) fn push(&mut self, field: SampleField, line: u64, text: &dyn Fn() -> String) {
         let defect = match field {

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use super::column::SignalColumn;
+use super::column::{ColumnScaling, SignalColumn};
 use super::thresholds::{WRAP_LEAST_STEPS, WRAP_RANGE_MARGIN, WRAP_STEP_TOLERANCE};
 use super::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::median;
@@ -27,24 +27,36 @@ pub struct UnwrappedAngle {
 impl SignalRecording {
     /// Multiplies a column by a factor, together with its values before any repair. A missing column stays missing.
     pub fn scale_column(&mut self, name: &str, factor: f64) {
-        let Some(column) = self.columns.get_mut(name) else {
-            return;
-        };
-        let before_repair = column.as_recorded.iter_mut().flat_map(|(values, _)| values);
-        for value in column.values.iter_mut().chain(before_repair) {
-            *value *= factor;
+        if let Some(column) = self.columns.get_mut(name) {
+            column.scale(ColumnScaling { factor, offset: 0.0 });
         }
     }
 
-    /// Exchanges the contents of two columns. A column that is missing is missing under the other name afterwards.
+    /// How the values of a column become those of another name that is read from the same column of the file, such as
+    /// the torque of another motor with another ratio; unchanged if one of both is missing.
+    pub fn scaling_between(&self, from: &str, to: &str) -> ColumnScaling {
+        let scaling = |name: &str| self.columns.get(name).map(|column| column.scaling);
+        scaling(from)
+            .zip(scaling(to))
+            .map_or_else(ColumnScaling::default, |(from, to)| from.to(to))
+    }
+
+    /// Exchanges the columns of the file from which two names are read. Each name keeps its factor and its offset. A column
+    /// that is missing is missing under the other name afterwards.
     pub fn exchange_columns(&mut self, one: &str, other: &str) {
         let places = [one, other].map(|name| self.columns.get_index_of(name));
         match places {
             [Some(a), Some(b)] => {
+                let [there, back] = [self.scaling_between(one, other), self.scaling_between(other, one)];
                 // The names keep their places, only the contents change.
-                let moved = std::mem::take(&mut self.columns[a]);
-                let back = std::mem::replace(&mut self.columns[b], moved);
-                self.columns[a] = back;
+                let mut moved = std::mem::take(&mut self.columns[a]);
+                moved.scale(there);
+                let own = [moved.scaling, self.columns[b].scaling];
+                moved.scaling = own[1];
+                let mut returned = std::mem::replace(&mut self.columns[b], moved);
+                returned.scale(back);
+                returned.scaling = own[0];
+                self.columns[a] = returned;
             }
             [Some(a), None] => self.rename_column(a, other),
             [None, Some(b)] => self.rename_column(b, one),
@@ -152,7 +164,7 @@ mod tests {
     use std::fmt::Write as _;
 
     use super::*;
-    use crate::ReadOptions;
+    use crate::{ComputedColumn, ReadOptions};
 
     /// A recording of an angle that turns on, with its force.
     fn recording(angle: impl Fn(f64) -> f64) -> SignalRecording {
@@ -162,6 +174,41 @@ mod tests {
             writeln!(text, "{t},{},{}", angle(t), t.sin()).unwrap();
         }
         SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap()
+    }
+
+    /// Two names that are read from each other's columns keep their own factors and offsets, as motors with different
+    /// ratios do, and a second exchange undoes the first.
+    #[test]
+    fn exchanged_columns_keep_the_factors_of_their_names() {
+        let read = |columns: [&str; 2]| {
+            let computed = |name: &str, column: &str, factor: f64, offset: f64| ComputedColumn {
+                name: name.to_owned(),
+                terms: vec![(column.to_owned(), factor)],
+                offset,
+            };
+            let options = ReadOptions {
+                computed: vec![
+                    computed("one", columns[0], 250.0, 1.0),
+                    computed("other", columns[1], -150.0, 0.5),
+                ],
+                ..ReadOptions::default()
+            };
+            let text = "t,a,b\n0,1,2\n0.1,3,5\n0.2,-4,7\n";
+            SignalRecording::from_bytes(text.as_bytes(), "run.csv", &options).unwrap()
+        };
+        let [true_order, mut exchanged] = [read(["a", "b"]), read(["b", "a"])];
+        let wrong = exchanged.clone();
+        let is_close = |left: &SignalRecording, right: &SignalRecording| {
+            ["one", "other"].iter().all(|name| {
+                let [left, right] = [left, right].map(|read| read.column(name).unwrap());
+                left.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-9)
+            })
+        };
+        assert!(!is_close(&exchanged, &true_order));
+        exchanged.exchange_columns("one", "other");
+        assert!(is_close(&exchanged, &true_order));
+        exchanged.exchange_columns("one", "other");
+        assert!(is_close(&exchanged, &wrong));
     }
 
     /// Whatever the range of a wrapped angle, the unwrapped one differs from the true one by a constant.

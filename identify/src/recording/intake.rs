@@ -6,7 +6,7 @@
 use indexmap::IndexMap;
 
 use crate::recording::SignalRecording;
-use crate::recording::column::{ColumnDefect, SampleField, SignalColumn, missing_column_fault};
+use crate::recording::column::{ColumnDefect, ColumnScaling, SampleField, SignalColumn, missing_column_fault};
 use crate::recording::error::RecordingFault;
 use crate::recording::notes::RecordingNote;
 use crate::recording::options::{ComputedColumn, NonFinitePolicy, ReadOptions};
@@ -380,6 +380,14 @@ fn compute_column(computed: &ComputedColumn, theirs: &[String], columns: &[Signa
         }
         sum.text = sum.text.or_else(|| column.text.clone());
         sum.not_finite = sum.not_finite.or_else(|| column.not_finite.clone());
+    }
+    if let [(_, factor)] = computed.terms.as_slice()
+        && *factor != 0.0
+    {
+        sum.scaling = ColumnScaling {
+            factor: *factor,
+            offset: computed.offset,
+        };
     }
     sum
 }

@@ -26,6 +26,7 @@ mod thresholds;
 use indexmap::IndexMap;
 
 use crate::words::nearest_name;
+pub use column::ColumnScaling;
 pub use corrections::UnwrappedAngle;
 pub use error::{RecordingError, RecordingFault};
 pub use file::RecordingFile;
@@ -181,6 +182,7 @@ impl SignalRecording {
                 text: column.text.clone(),
                 not_finite: column.not_finite.clone(),
                 as_recorded: None,
+                scaling: column.scaling,
             };
             (name.clone(), column)
         });

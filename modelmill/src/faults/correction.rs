@@ -1,7 +1,7 @@
 //! Corrections of a recording: as a change of sampled states, with which a hypothesis is tested, and as an operation on
 //! the recording as it was read, which is then prepared again.
 
-use modelmill_identify::SignalRecording;
+use modelmill_identify::{ColumnScaling, SignalRecording};
 
 /// A change of the motion at samples.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,8 +10,9 @@ pub(super) enum MotionChange {
     None,
     /// Coordinates are multiplied by a factor for positions, rates and accelerations each.
     Scale(Vec<(usize, [f64; 3])>),
-    /// Two coordinates are exchanged.
-    Exchange(usize, usize),
+    /// Two coordinates are exchanged. The scalings turn positions, rates and accelerations of the first into those of the
+    /// second, and back.
+    Exchange(usize, usize, [[ColumnScaling; 2]; 3]),
 }
 
 impl MotionChange {
@@ -24,7 +25,12 @@ impl MotionChange {
                     columns[*coordinate].iter_mut().for_each(|x| *x *= factors[order]);
                 }
             }
-            Self::Exchange(a, b) => columns.swap(*a, *b),
+            Self::Exchange(a, b, scalings) => {
+                let [there, back] = scalings[order];
+                columns[*a].iter_mut().for_each(|x| *x = there.scale(*x));
+                columns[*b].iter_mut().for_each(|x| *x = back.scale(*x));
+                columns.swap(*a, *b);
+            }
         }
     }
 }
@@ -79,7 +85,7 @@ impl ColumnOperation {
         ]
     }
 
-    /// Two coordinates or two forces with all columns that belong to them.
+    /// Two coordinates or two forces with all columns that belong to them. Each keeps its factor and its offset.
     pub(super) fn exchange(one: &str, other: &str) -> Self {
         let suffixes = ["", "_d", "_dd", "_var"];
         let pair = |suffix: &str| (format!("{one}{suffix}"), format!("{other}{suffix}"));

@@ -2,6 +2,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, OptionSetting};
+use modelmill_identify::ColumnScaling;
 
 use super::bench::FaultBench;
 use super::correction::{ColumnOperation, ForceChange, MotionChange};
@@ -23,6 +24,37 @@ fn exchange_maps(subject: &FaultSubject<'_>, one: &str, other: &str) -> Vec<Opti
     maps.map(|map| OptionSetting::new(OptionName::Columns, map)).collect()
 }
 
+/// The change of two exchanged forces, by their drives. Offsets of columns of forces are not exchanged here.
+fn exchanged_forces(subject: &FaultSubject<'_>, drives: [&str; 2], places: [usize; 2]) -> ForceChange {
+    let [one, other] = drives;
+    let factor = |from: &str, to: &str| subject.raw.scaling_between(from, to).factor;
+    ForceChange(vec![
+        (places[0], places[1], factor(other, one)),
+        (places[1], places[0], factor(one, other)),
+    ])
+}
+
+/// The change of the motion if two coordinates are exchanged, by their names and places.
+fn exchanged_coordinates(subject: &FaultSubject<'_>, names: [&str; 2], places: [usize; 2]) -> MotionChange {
+    let [one, other] = names;
+    let scalings = [0, 1, 2].map(|order| {
+        let scaling = |from: &str, to: &str| {
+            if order > 0 && [from, to].iter().all(|name| subject.is_recorded(name, order)) {
+                let suffix = if order == 1 { "_d" } else { "_dd" };
+                return subject
+                    .raw
+                    .scaling_between(&format!("{from}{suffix}"), &format!("{to}{suffix}"));
+            }
+            let position = subject.raw.scaling_between(from, to);
+            // Derivatives have the factor of the positions from which they are computed.
+            let offset = if order == 0 { position.offset } else { 0.0 };
+            ColumnScaling { offset, ..position }
+        };
+        [scaling(one, other), scaling(other, one)]
+    });
+    MotionChange::Exchange(places[0], places[1], scalings)
+}
+
 impl RecordingFaultEntry for ExchangedForces {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
         let drives = subject.model.drives();
@@ -40,7 +72,7 @@ impl RecordingFaultEntry for ExchangedForces {
                     subject.column_remedy(exchange_maps(subject, &drives[a], &drives[b]))
                 ),
                 motion: MotionChange::None,
-                forces: ForceChange(vec![(a, b, 1.0), (b, a, 1.0)]),
+                forces: exchanged_forces(subject, [&drives[a], &drives[b]], [a, b]),
                 operations: vec![ColumnOperation::exchange(&drives[a], &drives[b])],
                 is_implausible_now: false,
             })
@@ -70,7 +102,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                         "check which column is which, and exchange them ({})",
                         subject.column_remedy(maps.clone())
                     ),
-                    motion: MotionChange::Exchange(*a, *b),
+                    motion: exchanged_coordinates(subject, [one, other], [*a, *b]),
                     forces: ForceChange::default(),
                     operations: vec![ColumnOperation::exchange(one, other)],
                     is_implausible_now: false,
@@ -92,8 +124,8 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                              `{other_force}`"
                         ),
                         advice: message!("check which column is which, and exchange them ({})", subject.column_remedy(all)),
-                        motion: MotionChange::Exchange(*a, *b),
-                        forces: ForceChange(vec![(c, d, 1.0), (d, c, 1.0)]),
+                        motion: exchanged_coordinates(subject, [one, other], [*a, *b]),
+                        forces: exchanged_forces(subject, [&force, &other_force], [c, d]),
                         operations: vec![
                             ColumnOperation::exchange(one, other),
                             ColumnOperation::exchange(&force, &other_force),

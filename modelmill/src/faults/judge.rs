@@ -55,9 +55,6 @@ impl JudgedHypothesis {
     /// drive some drives, and with the other signs it brakes them and drives no others. The fit must agree, unless the
     /// forces of two or more drives turn together. A single drive has no fit that could agree.
     fn is_decided_by_friction(&self, before: &HypothesisErrors) -> bool {
-        if self.hypothesis.kind != RecordingFaultKind::WrongSign {
-            return false;
-        }
         let turned = self.errors.drives_braked_instead(before);
         let turns_all = turned > 1 && turned == before.dissipation.len();
         let least_gain = if turns_all {
@@ -65,7 +62,16 @@ impl JudgedHypothesis {
         } else {
             FRICTION_LEAST_FIT_GAIN
         };
-        turned > 0 && self.fit_gain > least_gain && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
+        self.is_asked_by_friction(before, least_gain)
+    }
+
+    /// Whether friction would drive the machine with the signs as they are recorded and brakes it with the others, and the
+    /// fitted errors fall by more than `least_gain` then.
+    fn is_asked_by_friction(&self, before: &HypothesisErrors, least_gain: f64) -> bool {
+        self.hypothesis.kind == RecordingFaultKind::WrongSign
+            && self.errors.drives_braked_instead(before) > 0
+            && self.fit_gain > least_gain
+            && self.nominal_gain > -NOMINAL_LOSS_TOLERANCE
     }
 
     /// Whether the nominal values decide, as they must for a sign or a unit that a fit absorbs.
@@ -112,7 +118,8 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
         None => HypothesisErrors::out_of_reach(&bench),
     };
     let judged = judge_all(subject, &bench, rows.as_ref(), &before);
-    let mut decisive: Vec<JudgedHypothesis> = judged.into_iter().filter(|one| one.is_decisive(&before)).collect();
+    let (mut decisive, others): (Vec<JudgedHypothesis>, Vec<JudgedHypothesis>) =
+        judged.into_iter().partition(|one| one.is_decisive(&before));
     decisive.sort_by(|a, b| b.score().total_cmp(&a.score()));
     let file = subject.raw.file();
     let best = decisive.first().map_or(f64::NEG_INFINITY, JudgedHypothesis::score);
@@ -134,8 +141,11 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
     } else {
         RIVAL_MARGIN
     };
-    let rivals: Vec<&JudgedHypothesis> = decisive[1..]
+    // The direction of friction shows that a sign is wrong, but not whether it is that of the force or of the coordinate.
+    let asked_by_friction = others
         .iter()
+        .filter(|one| is_by_friction && one.is_asked_by_friction(&before, -FIT_LOSS_TOLERANCE));
+    let rivals: Vec<&JudgedHypothesis> = (decisive[1..].iter().chain(asked_by_friction))
         .filter(|one| one.score() > best.score() - margin)
         .collect();
     let is_unique = rivals.iter().all(|one| one.is_equivalent(best));

@@ -264,7 +264,11 @@ fn needed_profiles(
         let level = spread(r, vec![1.0; counts[r]]);
         let change = spread(r, best.profile.values(counts[r]));
         let remaining = |further: &[&Vec<f64>]| {
-            let profiles: Vec<&[f64]> = accepted.iter().chain(further.iter().copied()).map(Vec::as_slice).collect();
+            let profiles: Vec<&[f64]> = accepted
+                .iter()
+                .chain(further.iter().copied())
+                .map(Vec::as_slice)
+                .collect();
             (total - reduced.explained_squares(&profiles)).max(f64::MIN_POSITIVE)
         };
         // Twice the decrease of the logarithm of the likelihood must exceed the price of its parameters and times.
