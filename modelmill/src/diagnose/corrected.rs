@@ -2,7 +2,7 @@
 //! recordings as they would be without these faults come out, with the list of what was corrected.
 //!
 //! Decision: a fault that one recording shows clearly is corrected in the other recordings as well if it explains them
-//! better, since one machine and one logger made them.
+//! better, and better than a fault of their own, since one machine and one logger made them.
 
 use std::sync::Arc;
 
@@ -159,9 +159,11 @@ impl CorrectedRecordings {
         let all_have_it = fault.recordings.len() == all.len();
         for one in &mut all {
             let has_it = fault.recordings.iter().any(|file| file == one.file());
-            if !has_it && one.suspected_fault().is_some() {
-                continue;
-            }
+            // What its own fault explains, if it has another one.
+            let of_own_fault = match one.suspected_fault() {
+                Some(own) if !has_it => self.score_of_fault(one, own)?,
+                _ => 0.0,
+            };
             // A recording that cannot be prepared with the correction does not have the fault.
             let corrected = match one.corrected(&self.model, operations) {
                 Ok(corrected) => corrected,
@@ -180,7 +182,7 @@ impl CorrectedRecordings {
                     fault.recordings.retain(|file| file != one.file());
                     continue;
                 }
-                if !has_it && gain <= SHARED_FAULT_LEAST_SCORE && !is_asked {
+                if !has_it && (gain <= SHARED_FAULT_LEAST_SCORE && !is_asked || gain <= of_own_fault) {
                     continue;
                 }
                 if !has_it {
@@ -195,6 +197,24 @@ impl CorrectedRecordings {
             None => self.corrected.push(fault),
         }
         Ok(true)
+    }
+
+    /// What the correction of a recording's own fault explains, as [`correction_score`] does; infinite if it cannot be
+    /// corrected by its columns.
+    ///
+    /// Fails when the job is cancelled.
+    fn score_of_fault(&self, one: &PreparedRecording, fault: &SuspectedFault) -> Outcome<f64> {
+        let Some(FaultCorrection::Columns(operations)) = &fault.correction else {
+            return Ok(f64::INFINITY);
+        };
+        match one.corrected(&self.model, operations) {
+            Ok(corrected) => {
+                let score = correction_score((&self.model, &one.segments), (&self.model, &corrected.segments));
+                Ok(score.map_or(f64::INFINITY, |score| score.gain))
+            }
+            Err(Error::Cancelled) => Err(Error::Cancelled),
+            Err(_) => Ok(f64::INFINITY),
+        }
     }
 
     /// Takes corrected recordings, those of the fit first, and prepares them again with common choices: those of the
