@@ -6,6 +6,7 @@
 //! alternatives. It is monotone in each of them; the constants are calibrated on benchmarks whose truth is known, see
 //! [`super::thresholds`].
 
+use nalgebra::DVector;
 use serde::Serialize;
 
 use super::SetResidual;
@@ -34,8 +35,8 @@ pub struct EffectSupport {
     pub white_residual: bool,
     /// Its share of the probability among its alternatives, 0 to 1; 1 if there are none.
     pub share: f64,
-    /// Whether one of its parameters differs from zero by more than twice its standard deviation. Terms of which none
-    /// does only cancel each other.
+    /// Whether one of its parameters differs from zero by more than twice its standard deviation, or its terms at least do
+    /// not cancel each other.
     pub has_clear_value: bool,
 }
 
@@ -95,10 +96,20 @@ impl EffectSelector<'_> {
                     unexplained: self.unexplained_ratio(&without, &channels, left),
                     white_residual: evidence.is_residual_white,
                     share: probability_share(aliases),
-                    has_clear_value: has_clear_value(estimates),
+                    has_clear_value: has_clear_value(estimates) || !self.do_terms_cancel(&picks[i], estimates),
                 }
             })
             .collect()
+    }
+
+    /// Whether the terms of an effect cancel each other: the square of their sum is smaller than the sum of their squares.
+    fn do_terms_cancel(&self, pick: &SelectedEffect, estimates: &[(f64, Option<f64>)]) -> bool {
+        let gram = self.pool.gram(&pick.columns, &self.weights, FitScope::All);
+        let values = DVector::from_iterator(estimates.len(), estimates.iter().map(|(value, _)| *value));
+        let squares_of_terms: f64 = (values.iter().enumerate())
+            .map(|(k, value)| value * value * gram[(k, k)])
+            .sum();
+        (values.transpose() * &gram * &values)[0] < squares_of_terms
     }
 
     /// Repeatable squares that a set leaves unexplained on some channels, relative to those that come back without a
@@ -122,12 +133,12 @@ impl EffectSelector<'_> {
     }
 }
 
-/// Whether one of some estimates differs clearly from zero. It counts as clear if no uncertainty is known.
+/// Whether one of some estimates differs clearly from zero; false if no uncertainty is known.
 fn has_clear_value(estimates: &[(f64, Option<f64>)]) -> bool {
-    let mut known = (estimates.iter())
-        .filter_map(|(value, deviation)| Some((*value, (*deviation)?)))
-        .peekable();
-    known.peek().is_none() || known.any(|(value, deviation)| value.abs() > CLEAR_LEAST_DEVIATIONS * deviation)
+    let mut known = estimates
+        .iter()
+        .filter_map(|(value, deviation)| Some((*value, (*deviation)?)));
+    known.any(|(value, deviation)| value.abs() > CLEAR_LEAST_DEVIATIONS * deviation)
 }
 
 /// How steady a gain is: over the blocks, or relative to the error of each block, whichever is steadier. A gain that is
@@ -210,16 +221,16 @@ mod tests {
         }
     }
 
-    /// Terms of which none differs from zero only cancel each other; without a known uncertainty nothing is known.
+    /// One clear parameter is enough; without a known uncertainty nothing is known.
     #[test]
-    fn terms_that_only_cancel_have_no_clear_value() {
+    fn one_parameter_beyond_its_uncertainty_is_clear() {
         assert!(!has_clear_value(&[
             (-162.0, Some(235.0)),
             (921.0, Some(4020.0)),
             (0.0, None)
         ]));
         assert!(has_clear_value(&[(-162.0, Some(235.0)), (921.0, Some(40.0))]));
-        assert!(has_clear_value(&[(1.0, None)]));
+        assert!(!has_clear_value(&[(1.0, None)]));
     }
 
     /// An alternative takes at most as much as an equal one, however much better it fits, and another form of the same

@@ -266,7 +266,7 @@ pub(super) const PROBABILITY_MOST: f64 = 0.99;
 /// A parameter differs clearly from zero if it exceeds this many standard deviations (1). By convention.
 pub(super) const CLEAR_LEAST_DEVIATIONS: f64 = 2.0;
 
-/// Largest probability of an effect of which no parameter differs clearly from zero (1): it is possible, but not lacking.
+/// Largest probability of an effect of which no parameter differs clearly from zero and whose terms cancel (1): it is possible, but not lacking.
 /// By judgement; a cable torque on EMPS with a step of the force has such values (`lab/measured/planted.py`).
 pub(super) const UNCLEAR_MOST_PROBABILITY: f64 = 0.4;
 

@@ -48,9 +48,8 @@ impl Default for ColumnScaling {
 }
 
 impl ColumnScaling {
-    /// The scaling of values with this one that should have another: the same values of the file are read as those of
-    /// another column.
-    pub(crate) fn to(self, other: Self) -> Self {
+    /// The scaling that turns values which were read with this scaling into values that are read with `other`.
+    pub(crate) fn conversion_to(self, other: Self) -> Self {
         let factor = other.factor / self.factor;
         Self {
             factor,
@@ -65,7 +64,7 @@ impl ColumnScaling {
 }
 
 /// The numbers of a column, NaN where a field has none, and its defects.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SignalColumn {
     /// One value per sample, in the unit of the file.
     pub(crate) values: Vec<f64>,
@@ -77,8 +76,21 @@ pub(crate) struct SignalColumn {
     pub(crate) interpolated: Vec<bool>,
     /// Values and interpolated samples before sensor faults were repaired; `None` if there were none.
     pub(crate) as_recorded: Option<(Vec<f64>, Vec<bool>)>,
-    /// How the values follow from the file, if they follow from one column of it.
-    pub(crate) scaling: ColumnScaling,
+    /// How the values follow from the file; `None` if they are no multiple of one column of it.
+    pub(crate) scaling: Option<ColumnScaling>,
+}
+
+impl Default for SignalColumn {
+    fn default() -> Self {
+        Self {
+            values: Vec::new(),
+            text: None,
+            not_finite: None,
+            interpolated: Vec::new(),
+            as_recorded: None,
+            scaling: Some(ColumnScaling::default()),
+        }
+    }
 }
 
 /// Fields of a column that cannot be used: the first of them and their number.

@@ -29,34 +29,42 @@ impl SignalRecording {
     pub fn scale_column(&mut self, name: &str, factor: f64) {
         if let Some(column) = self.columns.get_mut(name) {
             column.scale(ColumnScaling { factor, offset: 0.0 });
+            // The file is taken to have other values, so that the offset is scaled too.
+            if let Some(scaling) = &mut column.scaling {
+                scaling.offset *= factor;
+            }
         }
     }
 
-    /// How the values of a column become those of another name that is read from the same column of the file, such as
-    /// the torque of another motor with another ratio; unchanged if one of both is missing.
-    pub fn scaling_between(&self, from: &str, to: &str) -> ColumnScaling {
-        let scaling = |name: &str| self.columns.get(name).map(|column| column.scaling);
-        scaling(from)
-            .zip(scaling(to))
-            .map_or_else(ColumnScaling::default, |(from, to)| from.to(to))
+    /// The constant that is added to a column of the file, in the unit of the model; 0 for other columns.
+    pub fn column_offset(&self, name: &str) -> f64 {
+        let scaling = self.columns.get(name).and_then(|column| column.scaling);
+        scaling.map_or(0.0, |scaling| scaling.offset)
     }
 
-    /// Exchanges the columns of the file from which two names are read. Each name keeps its factor and its offset. A column
-    /// that is missing is missing under the other name afterwards.
-    pub fn exchange_columns(&mut self, one: &str, other: &str) {
+    /// The scaling that turns the values of one column into those of another name that is read from the same column of the
+    /// file, such as the torque of another motor with another ratio. Nothing changes if one of both is missing or is no
+    /// multiple of one column of the file.
+    pub fn conversion(&self, from: &str, to: &str) -> ColumnScaling {
+        let scaling = |name: &str| self.columns.get(name)?.scaling;
+        let pair = scaling(from).zip(scaling(to));
+        pair.map_or_else(ColumnScaling::default, |(from, to)| from.conversion_to(to))
+    }
+
+    /// Exchanges the contents of two columns; `conversions` turn the contents of the first into those of the second, and back.
+    /// A column that is missing is missing under the other name afterwards.
+    pub fn exchange_columns(&mut self, one: &str, other: &str, conversions: [ColumnScaling; 2]) {
         let places = [one, other].map(|name| self.columns.get_index_of(name));
         match places {
             [Some(a), Some(b)] => {
-                let [there, back] = [self.scaling_between(one, other), self.scaling_between(other, one)];
-                // The names keep their places, only the contents change.
-                let mut moved = std::mem::take(&mut self.columns[a]);
-                moved.scale(there);
-                let own = [moved.scaling, self.columns[b].scaling];
-                moved.scaling = own[1];
-                let mut returned = std::mem::replace(&mut self.columns[b], moved);
-                returned.scale(back);
-                returned.scaling = own[0];
-                self.columns[a] = returned;
+                // The names keep their places and their scalings, only the contents change.
+                self.columns[a].scale(conversions[0]);
+                self.columns[b].scale(conversions[1]);
+                let scalings = [a, b].map(|place| self.columns[place].scaling);
+                let content = std::mem::take(&mut self.columns[a]);
+                self.columns[a] = std::mem::replace(&mut self.columns[b], content);
+                self.columns[a].scaling = scalings[0];
+                self.columns[b].scaling = scalings[1];
             }
             [Some(a), None] => self.rename_column(a, other),
             [None, Some(b)] => self.rename_column(b, one),
@@ -205,10 +213,20 @@ mod tests {
             })
         };
         assert!(!is_close(&exchanged, &true_order));
-        exchanged.exchange_columns("one", "other");
+        let exchange = |read: &mut SignalRecording| {
+            let conversions = [read.conversion("one", "other"), read.conversion("other", "one")];
+            read.exchange_columns("one", "other", conversions);
+        };
+        exchange(&mut exchanged);
         assert!(is_close(&exchanged, &true_order));
-        exchanged.exchange_columns("one", "other");
+        exchange(&mut exchanged);
         assert!(is_close(&exchanged, &wrong));
+        // A column that was scaled keeps its offset in proportion.
+        exchanged.scale_column("one", -2.0);
+        let scaled = exchanged.clone();
+        exchange(&mut exchanged);
+        exchange(&mut exchanged);
+        assert!(is_close(&exchanged, &scaled));
     }
 
     /// Whatever the range of a wrapped angle, the unwrapped one differs from the true one by a constant.
@@ -262,10 +280,10 @@ mod tests {
         let intact = recording(f64::sin);
         let mut read = intact.clone();
         read.scale_column("q", -4.0);
-        read.exchange_columns("q", "motor");
+        read.exchange_columns("q", "motor", [ColumnScaling::default(); 2]);
         let [moved, before] = [read.column("motor").unwrap()[7], intact.column("q").unwrap()[7]];
         assert!((moved + 4.0 * before).abs() < 1e-12);
-        read.exchange_columns("motor", "q");
+        read.exchange_columns("motor", "q", [ColumnScaling::default(); 2]);
         read.scale_column("q", -0.25);
         assert_eq!(read, intact);
         read.leave_out_samples("motor", &|t| (1.0..2.0).contains(&t));

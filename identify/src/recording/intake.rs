@@ -381,14 +381,13 @@ fn compute_column(computed: &ComputedColumn, theirs: &[String], columns: &[Signa
         sum.text = sum.text.or_else(|| column.text.clone());
         sum.not_finite = sum.not_finite.or_else(|| column.not_finite.clone());
     }
-    if let [(_, factor)] = computed.terms.as_slice()
-        && *factor != 0.0
-    {
-        sum.scaling = ColumnScaling {
+    sum.scaling = match computed.terms.as_slice() {
+        [(_, factor)] if *factor != 0.0 => Some(ColumnScaling {
             factor: *factor,
             offset: computed.offset,
-        };
-    }
+        }),
+        _ => None,
+    };
     sum
 }
 

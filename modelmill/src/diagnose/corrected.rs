@@ -159,11 +159,6 @@ impl CorrectedRecordings {
         let all_have_it = fault.recordings.len() == all.len();
         for one in &mut all {
             let has_it = fault.recordings.iter().any(|file| file == one.file());
-            // What its own fault explains, if it has another one.
-            let of_own_fault = match one.suspected_fault() {
-                Some(own) if !has_it => self.score_of_fault(one, own)?,
-                _ => 0.0,
-            };
             // A recording that cannot be prepared with the correction does not have the fault.
             let corrected = match one.corrected(&self.model, operations) {
                 Ok(corrected) => corrected,
@@ -182,7 +177,13 @@ impl CorrectedRecordings {
                     fault.recordings.retain(|file| file != one.file());
                     continue;
                 }
-                if !has_it && (gain <= SHARED_FAULT_LEAST_SCORE && !is_asked || gain <= of_own_fault) {
+                if !has_it && gain <= SHARED_FAULT_LEAST_SCORE && !is_asked {
+                    continue;
+                }
+                // Another fault of this recording may explain more.
+                if let Some(own) = one.suspected_fault().filter(|_| !has_it)
+                    && gain <= self.gain_of_correction(one, own)?
+                {
                     continue;
                 }
                 if !has_it {
@@ -199,21 +200,21 @@ impl CorrectedRecordings {
         Ok(true)
     }
 
-    /// What the correction of a recording's own fault explains, as [`correction_score`] does; infinite if it cannot be
-    /// corrected by its columns.
+    /// Gain of the correction of a fault of a recording, as [`correction_score`] states it: infinite if it is no correction of
+    /// columns, and below all others if the recording cannot be prepared with it.
     ///
     /// Fails when the job is cancelled.
-    fn score_of_fault(&self, one: &PreparedRecording, fault: &SuspectedFault) -> Outcome<f64> {
+    fn gain_of_correction(&self, one: &PreparedRecording, fault: &SuspectedFault) -> Outcome<f64> {
         let Some(FaultCorrection::Columns(operations)) = &fault.correction else {
             return Ok(f64::INFINITY);
         };
         match one.corrected(&self.model, operations) {
             Ok(corrected) => {
                 let score = correction_score((&self.model, &one.segments), (&self.model, &corrected.segments));
-                Ok(score.map_or(f64::INFINITY, |score| score.gain))
+                Ok(score.map_or(f64::NEG_INFINITY, |score| score.gain))
             }
             Err(Error::Cancelled) => Err(Error::Cancelled),
-            Err(_) => Ok(f64::INFINITY),
+            Err(_) => Ok(f64::NEG_INFINITY),
         }
     }
 

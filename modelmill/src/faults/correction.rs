@@ -10,9 +10,8 @@ pub(super) enum MotionChange {
     None,
     /// Coordinates are multiplied by a factor for positions, rates and accelerations each.
     Scale(Vec<(usize, [f64; 3])>),
-    /// Two coordinates are exchanged. The scalings turn positions, rates and accelerations of the first into those of the
-    /// second, and back.
-    Exchange(usize, usize, [[ColumnScaling; 2]; 3]),
+    /// Two coordinates are exchanged. The difference of their zeros, second minus first, stays.
+    Exchange(usize, usize, f64),
 }
 
 impl MotionChange {
@@ -25,17 +24,19 @@ impl MotionChange {
                     columns[*coordinate].iter_mut().for_each(|x| *x *= factors[order]);
                 }
             }
-            Self::Exchange(a, b, scalings) => {
-                let [there, back] = scalings[order];
-                columns[*a].iter_mut().for_each(|x| *x = there.scale(*x));
-                columns[*b].iter_mut().for_each(|x| *x = back.scale(*x));
+            Self::Exchange(a, b, difference) => {
                 columns.swap(*a, *b);
+                if order == 0 {
+                    columns[*a].iter_mut().for_each(|x| *x -= difference);
+                    columns[*b].iter_mut().for_each(|x| *x += difference);
+                }
             }
         }
     }
 }
 
-/// A change of the measured forces: for each drive that changes, the drive whose column it gets, and a factor.
+/// A change of the measured forces: for each drive that changes, the drive whose column it gets, and a factor. Offsets of
+/// columns are left out here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ForceChange(pub(super) Vec<(usize, usize, f64)>);
 
@@ -58,8 +59,8 @@ impl ForceChange {
 pub(crate) enum ColumnOperation {
     /// Columns are multiplied by a factor.
     Scale(Vec<String>, f64),
-    /// Pairs of columns are exchanged.
-    Exchange(Vec<(String, String)>),
+    /// Pairs of columns are exchanged, each with the scalings that turn the first into the second, and back.
+    Exchange(Vec<(String, String, [ColumnScaling; 2])>),
 }
 
 /// What corrects a fault hypothetically.
@@ -85,11 +86,27 @@ impl ColumnOperation {
         ]
     }
 
-    /// Two coordinates or two forces with all columns that belong to them. Each keeps its factor and its offset.
-    pub(super) fn exchange(one: &str, other: &str) -> Self {
-        let suffixes = ["", "_d", "_dd", "_var"];
-        let pair = |suffix: &str| (format!("{one}{suffix}"), format!("{other}{suffix}"));
-        Self::Exchange(suffixes.into_iter().map(pair).collect())
+    /// Two coordinates with their derivatives; `difference` of their zeros, second minus first, stays. A unit belongs to the
+    /// column of the file and moves with it.
+    pub(super) fn exchange_coordinates(one: &str, other: &str, difference: f64) -> Self {
+        let shift = |offset: f64| ColumnScaling { factor: 1.0, offset };
+        let pair = |suffix: &str| {
+            let offset = if suffix.is_empty() { difference } else { 0.0 };
+            let conversions = [shift(offset), shift(-offset)];
+            (format!("{one}{suffix}"), format!("{other}{suffix}"), conversions)
+        };
+        Self::Exchange(["", "_d", "_dd"].map(pair).into())
+    }
+
+    /// Two forces with their variances. Ratios and motor constants belong to the drives: `conversions` turn the force of the
+    /// first into that of the second, and back.
+    pub(super) fn exchange_forces(one: &str, other: &str, conversions: [ColumnScaling; 2]) -> Self {
+        let squared = conversions.map(|scaling| ColumnScaling {
+            factor: scaling.factor * scaling.factor,
+            offset: 0.0,
+        });
+        let pair = |suffix: &str, conversions| (format!("{one}{suffix}"), format!("{other}{suffix}"), conversions);
+        Self::Exchange(vec![pair("", conversions), pair("_var", squared)])
     }
 
     /// Applies the operation to a recording.
@@ -97,8 +114,8 @@ impl ColumnOperation {
         match self {
             Self::Scale(names, factor) => names.iter().for_each(|name| raw.scale_column(name, *factor)),
             Self::Exchange(pairs) => {
-                for (one, other) in pairs {
-                    raw.exchange_columns(one, other);
+                for (one, other, conversions) in pairs {
+                    raw.exchange_columns(one, other, *conversions);
                 }
             }
         }

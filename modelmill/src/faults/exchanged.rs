@@ -24,35 +24,15 @@ fn exchange_maps(subject: &FaultSubject<'_>, one: &str, other: &str) -> Vec<Opti
     maps.map(|map| OptionSetting::new(OptionName::Columns, map)).collect()
 }
 
-/// The change of two exchanged forces, by their drives. Offsets of columns of forces are not exchanged here.
-fn exchanged_forces(subject: &FaultSubject<'_>, drives: [&str; 2], places: [usize; 2]) -> ForceChange {
-    let [one, other] = drives;
-    let factor = |from: &str, to: &str| subject.raw.scaling_between(from, to).factor;
-    ForceChange(vec![
-        (places[0], places[1], factor(other, one)),
-        (places[1], places[0], factor(one, other)),
-    ])
+/// The scalings that turn the force of one drive into that of another, and back.
+fn force_conversions(subject: &FaultSubject<'_>, one: &str, other: &str) -> [ColumnScaling; 2] {
+    [subject.raw.conversion(one, other), subject.raw.conversion(other, one)]
 }
 
-/// The change of the motion if two coordinates are exchanged, by their names and places.
-fn exchanged_coordinates(subject: &FaultSubject<'_>, names: [&str; 2], places: [usize; 2]) -> MotionChange {
-    let [one, other] = names;
-    let scalings = [0, 1, 2].map(|order| {
-        let scaling = |from: &str, to: &str| {
-            if order > 0 && [from, to].iter().all(|name| subject.is_recorded(name, order)) {
-                let suffix = if order == 1 { "_d" } else { "_dd" };
-                return subject
-                    .raw
-                    .scaling_between(&format!("{from}{suffix}"), &format!("{to}{suffix}"));
-            }
-            let position = subject.raw.scaling_between(from, to);
-            // Derivatives have the factor of the positions from which they are computed.
-            let offset = if order == 0 { position.offset } else { 0.0 };
-            ColumnScaling { offset, ..position }
-        };
-        [scaling(one, other), scaling(other, one)]
-    });
-    MotionChange::Exchange(places[0], places[1], scalings)
+/// The change of two exchanged forces by the places of their drives.
+fn exchanged_forces(places: [usize; 2], [to_other, to_one]: [ColumnScaling; 2]) -> ForceChange {
+    let [one, other] = places;
+    ForceChange(vec![(one, other, to_one.factor), (other, one, to_other.factor)])
 }
 
 impl RecordingFaultEntry for ExchangedForces {
@@ -63,7 +43,8 @@ impl RecordingFaultEntry for ExchangedForces {
         let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
         pairs
             .filter(|(a, b)| subject.model.force_unit(*a) == subject.model.force_unit(*b))
-            .map(|(a, b)| FaultHypothesis {
+            .map(|(a, b)| (a, b, force_conversions(subject, &drives[a], &drives[b])))
+            .map(|(a, b, conversions)| FaultHypothesis {
                 kind: RecordingFaultKind::ExchangedColumns,
                 at: vec![drives[a].clone(), drives[b].clone()],
                 clause: format!("the forces of `{}` and `{}` are exchanged", drives[a], drives[b]),
@@ -72,8 +53,8 @@ impl RecordingFaultEntry for ExchangedForces {
                     subject.column_remedy(exchange_maps(subject, &drives[a], &drives[b]))
                 ),
                 motion: MotionChange::None,
-                forces: exchanged_forces(subject, [&drives[a], &drives[b]], [a, b]),
-                operations: vec![ColumnOperation::exchange(&drives[a], &drives[b])],
+                forces: exchanged_forces([a, b], conversions),
+                operations: vec![ColumnOperation::exchange_forces(&drives[a], &drives[b], conversions)],
                 is_implausible_now: false,
             })
             .collect()
@@ -94,6 +75,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                     continue;
                 }
                 let maps = exchange_maps(subject, one, other);
+                let difference = subject.raw.column_offset(other) - subject.raw.column_offset(one);
                 hypotheses.push(FaultHypothesis {
                     kind: RecordingFaultKind::ExchangedColumns,
                     at: vec![one.clone(), other.clone()],
@@ -102,9 +84,9 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                         "check which column is which, and exchange them ({})",
                         subject.column_remedy(maps.clone())
                     ),
-                    motion: exchanged_coordinates(subject, [one, other], [*a, *b]),
+                    motion: MotionChange::Exchange(*a, *b, difference),
                     forces: ForceChange::default(),
-                    operations: vec![ColumnOperation::exchange(one, other)],
+                    operations: vec![ColumnOperation::exchange_coordinates(one, other, difference)],
                     is_implausible_now: false,
                 });
                 // The order of two joints may be exchanged as a whole.
@@ -114,6 +96,7 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                 ) {
                     // Drives have names of their own, which need not be those of the coordinates.
                     let [force, other_force] = [c, d].map(|k| mechanism.drives[k].name.clone());
+                    let conversions = force_conversions(subject, &force, &other_force);
                     let mut all = maps;
                     all.extend(exchange_maps(subject, &force, &other_force));
                     hypotheses.push(FaultHypothesis {
@@ -124,11 +107,11 @@ impl RecordingFaultEntry for ExchangedCoordinates {
                              `{other_force}`"
                         ),
                         advice: message!("check which column is which, and exchange them ({})", subject.column_remedy(all)),
-                        motion: exchanged_coordinates(subject, [one, other], [*a, *b]),
-                        forces: exchanged_forces(subject, [&force, &other_force], [c, d]),
+                        motion: MotionChange::Exchange(*a, *b, difference),
+                        forces: exchanged_forces([c, d], conversions),
                         operations: vec![
-                            ColumnOperation::exchange(one, other),
-                            ColumnOperation::exchange(&force, &other_force),
+                            ColumnOperation::exchange_coordinates(one, other, difference),
+                            ColumnOperation::exchange_forces(&force, &other_force, conversions),
                         ],
                         is_implausible_now: false,
                     });

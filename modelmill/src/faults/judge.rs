@@ -62,12 +62,12 @@ impl JudgedHypothesis {
         } else {
             FRICTION_LEAST_FIT_GAIN
         };
-        self.is_asked_by_friction(before, least_gain)
+        self.is_supported_by_friction(before, least_gain)
     }
 
     /// Whether friction would drive the machine with the signs as they are recorded and brakes it with the others, and the
     /// fitted errors fall by more than `least_gain` then.
-    fn is_asked_by_friction(&self, before: &HypothesisErrors, least_gain: f64) -> bool {
+    fn is_supported_by_friction(&self, before: &HypothesisErrors, least_gain: f64) -> bool {
         self.hypothesis.kind == RecordingFaultKind::WrongSign
             && self.errors.drives_braked_instead(before) > 0
             && self.fit_gain > least_gain
@@ -142,10 +142,13 @@ pub(crate) fn find_fault(subject: &FaultSubject<'_>) -> Option<SuspectedFault> {
         RIVAL_MARGIN
     };
     // The direction of friction shows that a sign is wrong, but not whether it is that of the force or of the coordinate.
-    let asked_by_friction = others
-        .iter()
-        .filter(|one| is_by_friction && one.is_asked_by_friction(&before, -FIT_LOSS_TOLERANCE));
-    let rivals: Vec<&JudgedHypothesis> = (decisive[1..].iter().chain(asked_by_friction))
+    let turned = best.errors.drives_braked_instead(&before);
+    let supported_by_friction = others.iter().filter(|one| {
+        is_by_friction
+            && one.is_supported_by_friction(&before, -FIT_LOSS_TOLERANCE)
+            && one.errors.drives_braked_instead(&before) >= turned
+    });
+    let rivals: Vec<&JudgedHypothesis> = (decisive[1..].iter().chain(supported_by_friction))
         .filter(|one| one.score() > best.score() - margin)
         .collect();
     let is_unique = rivals.iter().all(|one| one.is_equivalent(best));

@@ -161,16 +161,18 @@ fn find_change(
     let all = 0..products.recordings.len();
     let mut remaining: f64 = all.map(|r| products.residual_squares(k, r)).sum();
     let times = problem.layout.times();
-    let bests = (0..products.recordings.len()).map(|r| best_profile(products, k, r));
-    let bests = needed_profiles(products, k, bests.collect());
-    for (r, (recording, best)) in products.recordings.iter().zip(bests).enumerate() {
-        let Some(best) = best else { continue };
+    let bests = products.recordings.iter().enumerate().map(|(r, recording)| {
+        let best = best_profile(products, k, r)?;
         let samples = products.refine_times(k, r, &best.profile);
-        if is_signal_at_standstill(problem, shape, &recording.samples, &samples) {
-            continue;
-        }
+        let stands = is_signal_at_standstill(problem, shape, &recording.samples, &samples);
+        (!stands).then_some((best, samples))
+    });
+    let mut bests: Vec<Option<(BestProfile, Range<usize>)>> = bests.collect();
+    remove_needless_profiles(products, k, &mut bests);
+    for (recording, best) in products.recordings.iter().zip(bests) {
+        let Some((best, samples)) = best else { continue };
         explained += best.gain;
-        searched_constants += best.profile.searched_times();
+        searched_constants += best.profile.searched_constants();
         remaining -= best.gain + best.of_level;
         let last = recording.samples.end - 1;
         intervals.push(ChangeInterval {
@@ -234,53 +236,61 @@ fn is_signal_at_standstill(
         || !moves_within(&mut recording.clone().filter(|i| !is_changed(i)))
 }
 
-/// The profiles, `[recording]`, that are needed beside those of the other recordings: a large change in one recording
-/// falsifies the fit of all, so that each of them seems to have one.
-fn needed_profiles(
+/// Removes the profiles, `[recording]`, that explain no more than noise in addition to the others: a large change in one
+/// recording biases the fit of all, so that each of them seems to have one. The one that explains least goes first.
+fn remove_needless_profiles(
     products: &BlockProducts<'_>,
     shape: usize,
-    mut bests: Vec<Option<BestProfile>>,
-) -> Vec<Option<BestProfile>> {
-    let gain = |best: &Option<BestProfile>| best.as_ref().map_or(0.0, |best| best.gain);
-    let mut order: Vec<usize> = (0..bests.len()).filter(|r| bests[*r].is_some()).collect();
-    if order.len() < 2 {
-        return bests;
+    bests: &mut [Option<(BestProfile, Range<usize>)>],
+) {
+    let all = 0..bests.len();
+    let mut kept: Vec<usize> = all.clone().filter(|r| bests[*r].is_some()).collect();
+    if kept.len() < 2 {
+        return;
     }
-    order.sort_by(|a, b| gain(&bests[*b]).total_cmp(&gain(&bests[*a])));
-    let reduced = products.reduce_blocks(shape, 0..bests.len());
+    let reduced = products.reduce_blocks(shape, all.clone());
     let counts: Vec<usize> = products.recordings.iter().map(|cut| cut.blocks.len()).collect();
     // Values of one recording with zeros for all others.
     let spread = |r: usize, values: Vec<f64>| {
         let [before, after] = [&counts[..r], &counts[r + 1..]].map(|counts| vec![0.0; counts.iter().sum()]);
         [before, values, after].concat()
     };
-    let all = 0..bests.len();
-    let total: f64 = all.clone().map(|r| products.residual_squares(shape, r)).sum();
-    let worth: f64 = all.map(|r| products.effective_samples(shape, r)).sum();
+    let profile = |r: usize| bests[r].as_ref().map(|(best, _)| best.profile);
+    let changes: Vec<Vec<f64>> = (all.clone())
+        .map(|r| {
+            spread(
+                r,
+                profile(r).map_or_else(|| vec![0.0; counts[r]], |one| one.values(counts[r])),
+            )
+        })
+        .collect();
+    let levels: Vec<Vec<f64>> = all.clone().map(|r| spread(r, vec![1.0; counts[r]])).collect();
+    let total: f64 = all.map(|r| products.residual_squares(shape, r)).sum();
     let parameters = products.shape_columns(shape).len();
-    let mut accepted: Vec<Vec<f64>> = Vec::new();
-    for r in order {
-        let Some(best) = &bests[r] else { continue };
-        let level = spread(r, vec![1.0; counts[r]]);
-        let change = spread(r, best.profile.values(counts[r]));
-        let remaining = |further: &[&Vec<f64>]| {
-            let profiles: Vec<&[f64]> = accepted
-                .iter()
-                .chain(further.iter().copied())
-                .map(Vec::as_slice)
-                .collect();
-            (total - reduced.explained_squares(&profiles)).max(f64::MIN_POSITIVE)
+    let found: Vec<Vec<f64>> = kept.iter().map(|r| changes[*r].clone()).collect();
+    let effective_samples = products.effective_samples(shape, &reduced, &found);
+    while kept.len() > 1 {
+        // Twice the decrease of the logarithm of the likelihood, less the price of its parameters and times.
+        let worth = |r: usize| {
+            let others = kept.iter().filter(|other| **other != r).map(|other| &changes[*other]);
+            let others: Vec<&[f64]> = others.chain([&levels[r]]).map(Vec::as_slice).collect();
+            let with = [others.as_slice(), &[changes[r].as_slice()]].concat();
+            let [before, after] =
+                [others, with].map(|profiles| (total - reduced.explained_squares(&profiles)).max(f64::MIN_POSITIVE));
+            let constants = profile(r).map_or(0, TimeProfile::searched_constants);
+            effective_samples * (before / after).ln() - (parameters + constants) as f64 * effective_samples.ln()
         };
-        // Twice the decrease of the logarithm of the likelihood must exceed the price of its parameters and times.
-        let gain = worth * (remaining(&[&level]) / remaining(&[&level, &change])).ln();
-        let numbers = parameters + best.profile.searched_times();
-        if accepted.is_empty() || gain > numbers as f64 * worth.ln() {
-            accepted.push(change);
-        } else {
-            bests[r] = None;
+        let least = kept.iter().map(|r| (*r, worth(*r))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((needless, _)) = least.filter(|(_, worth)| *worth <= 0.0) else {
+            break;
+        };
+        kept.retain(|r| *r != needless);
+    }
+    for (r, best) in bests.iter_mut().enumerate() {
+        if !kept.contains(&r) {
+            *best = None;
         }
     }
-    bests
 }
 
 /// The step or interval of a shape that explains most in a recording.

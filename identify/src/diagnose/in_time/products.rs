@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::column::ForceColumn;
 use super::super::factored::GramFactor;
-use super::super::noise::effective_samples;
+use super::super::noise::effective_samples as independent_samples;
 use super::super::pool::solve_gram;
 use super::super::problem::DiagnosisProblem;
 use super::profile::TimeProfile;
@@ -47,8 +47,6 @@ pub(super) struct CutRecording {
     products: Vec<DMatrix<f64>>,
     /// Weighted squares of the residual of the set by channel.
     squares: Vec<f64>,
-    /// Effective number of samples of that residual by channel.
-    effective_samples: Vec<f64>,
 }
 
 /// The products of a shape in one block, with the set projected out.
@@ -205,8 +203,6 @@ impl<'a> BlockProducts<'a> {
             let squares = squares.collect();
             let recording = &mut one.recordings[r];
             (recording.products, recording.squares) = (products, squares);
-            let parts = rest.iter().map(|rest| effective_samples(&rest[samples.clone()]));
-            recording.effective_samples = parts.collect();
         }
         Some(one)
     }
@@ -218,19 +214,61 @@ impl<'a> BlockProducts<'a> {
 
     /// Weighted squares of the residual of a recording on the channels on which a shape acts.
     pub(super) fn residual_squares(&self, shape: usize, recording: usize) -> f64 {
-        self.sum_on_channels(shape, &self.recordings[recording].squares)
+        let squares = self.recordings[recording].squares.iter().enumerate();
+        let acting = squares.filter(|(d, _)| self.acts_on(shape, *d));
+        acting.map(|(_, squares)| squares).sum()
     }
 
-    /// Effective number of samples of the residual of a recording on the channels on which a shape acts.
-    pub(super) fn effective_samples(&self, shape: usize, recording: usize) -> f64 {
-        self.sum_on_channels(shape, &self.recordings[recording].effective_samples)
+    /// Whether a shape acts on a channel.
+    fn acts_on(&self, shape: usize, channel: usize) -> bool {
+        self.shapes[shape].iter().any(|column| column.0[channel].is_some())
     }
 
-    /// Sum of some values, `[channel]`, over the channels on which a shape acts.
-    fn sum_on_channels(&self, shape: usize, values: &[f64]) -> f64 {
-        let acts = |d: usize| self.shapes[shape].iter().any(|column| column.0[d].is_some());
-        let acting = values.iter().enumerate().filter(|(d, _)| acts(*d));
-        acting.map(|(_, value)| value).sum()
+    /// Effective number of samples of the residual of all recordings, on the channels on which a shape acts, if it acts with
+    /// some time profiles. `reduced` are the blocks of all recordings, and each profile has a value for each of them.
+    pub(super) fn effective_samples(&self, shape: usize, reduced: &ReducedBlocks, profiles: &[Vec<f64>]) -> f64 {
+        let slices: Vec<&[f64]> = profiles.iter().map(Vec::as_slice).collect();
+        let (own, _) = solve_gram(&reduced.gram(&slices));
+        let p = self.shapes[shape].len();
+        let blocks = || {
+            self.recordings
+                .iter()
+                .flat_map(|cut| cut.blocks.iter().zip(&cut.products))
+        };
+        // Factors of the shape in each block.
+        let by_block = |b: usize| {
+            let terms = profiles.iter().enumerate();
+            terms.fold(DVector::zeros(p), |sum, (k, profile)| {
+                sum + profile[b] * own.rows(p * k, p)
+            })
+        };
+        // The factors of the set change with those of the shape.
+        let n = self.set.len();
+        let start = self.starts[shape];
+        let mut gram = self.set_products(&(0..self.problem.layout.samples()));
+        for (b, (_, products)) in blocks().enumerate() {
+            let less = products.view((0, start), (n, p)) * by_block(b);
+            for i in 0..n {
+                gram[(i, n)] -= less[i];
+                gram[(n, i)] -= less[i];
+            }
+        }
+        let (factors, _) = solve_gram(&gram);
+        let channels = (0..self.weights.len()).filter(|d| self.acts_on(shape, *d));
+        let of_channel = |d: usize| -> f64 {
+            let mut rest = self.residual_with(d, &factors);
+            for (b, (range, _)) in blocks().enumerate() {
+                for (column, factor) in self.shapes[shape].iter().zip(by_block(b).iter()) {
+                    let Some(values) = &column.0[d] else { continue };
+                    for i in range.clone().filter(|i| !self.excluded[d][*i]) {
+                        rest[i] -= factor * values[i];
+                    }
+                }
+            }
+            let recordings = self.recordings.iter().map(|cut| &rest[cut.samples.clone()]);
+            recordings.map(independent_samples).sum()
+        };
+        channels.map(of_channel).sum::<f64>().max(2.0)
     }
 
     /// The blocks of some recordings for one shape, with the set projected out.
@@ -466,7 +504,6 @@ fn cut_recordings(problem: &DiagnosisProblem) -> Vec<CutRecording> {
             samples,
             products: Vec::new(),
             squares: Vec::new(),
-            effective_samples: Vec::new(),
         }
     };
     recordings.into_iter().map(cut).collect()

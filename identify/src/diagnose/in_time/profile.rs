@@ -31,7 +31,7 @@ impl TimeProfile {
 
     /// Searched constants: a change that lasts has one searched time, one that ends has two. Each is the best of as many
     /// times as there are effective samples: as for the best of many candidates, this costs twice their logarithm.
-    pub(super) fn searched_times(self) -> usize {
+    pub(super) fn searched_constants(self) -> usize {
         if self.end.is_some() { 4 } else { 2 }
     }
 

@@ -2,8 +2,17 @@ use super::super::problem::{SampleLayout, SampleSegment};
 use super::*;
 use crate::test_noise::TestNoise;
 
+/// Names of recordings.
+const RECORDINGS: [&str; 8] = ["one", "two", "three", "four", "five", "six", "seven", "eight"];
+
 /// Two recordings of 20 s at 50 Hz of one drive, whose force is 3 N per unit of a column plus noise of 0.2 N.
 fn problem(seed: u64, change: impl Fn(usize, f64, f64) -> f64) -> DiagnosisProblem {
+    problem_with(2, seed, change)
+}
+
+/// The same with some recordings, of which the last one is the validation run.
+fn problem_with(recordings: usize, seed: u64, change: impl Fn(usize, f64, f64) -> f64) -> DiagnosisProblem {
+    let samples = 1000 * recordings;
     let mut noise = TestNoise::new(seed);
     let segment = |name: &str, is_check: bool| SampleSegment {
         name: name.to_owned(),
@@ -14,24 +23,26 @@ fn problem(seed: u64, change: impl Fn(usize, f64, f64) -> f64) -> DiagnosisProbl
         is_check,
     };
     let time = |i: usize| 0.02 * (i % 1000) as f64;
-    let column: Vec<f64> = (0..2000)
+    let column: Vec<f64> = (0..samples)
         .map(|i| (1.9 * time(i)).sin() + 0.6 * (4.1 * time(i) + 1.0).cos() + 0.4)
         .collect();
     let force = |i: usize| {
         let plain = 3.0 * column[i];
         plain + change(i / 1000, time(i), plain) + 0.2 * noise.normal()
     };
-    let measured: Vec<f64> = (0..2000).map(force).collect();
+    let measured: Vec<f64> = (0..samples).map(force).collect();
     let mut problem = DiagnosisProblem {
         layout: SampleLayout {
             channels: vec!["a".into()],
-            segments: vec![segment("one", false), segment("two", true)],
+            segments: (0..recordings)
+                .map(|run| segment(RECORDINGS[run], run + 1 == recordings))
+                .collect(),
             left_out: Vec::new(),
         },
         measured: ForceColumn(vec![Some(measured)]),
         base: vec![
             ForceColumn(vec![Some(column)]),
-            ForceColumn(vec![Some(vec![1.0; 2000])]),
+            ForceColumn(vec![Some(vec![1.0; samples])]),
         ],
         noise: vec![0.2],
         idle: vec![false],
@@ -69,6 +80,33 @@ fn a_step_is_found_at_its_time() {
         let (recording, [from, _], _) = interval_of(&found(&jumped), "offset_step").unwrap();
         assert_eq!(recording, "one");
         assert!((from - 107.5).abs() < 0.4, "seed {seed}: {from}");
+    }
+}
+
+/// A step in each recording is found in each, a large and a small one in both, and a large one alone leaves no steps in the
+/// other recordings, though it biases the fit of all.
+#[test]
+fn steps_are_found_in_the_recordings_that_have_them() {
+    for seed in 0..5 {
+        for (recordings, sizes) in [
+            (3, vec![1.0, 1.0, 1.0]),
+            (8, vec![1.0; 8]),
+            (2, vec![3.0, 1.0]),
+            (3, vec![6.0, 0.0, 0.0]),
+            (8, vec![0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ] {
+            let jumped = problem_with(recordings, seed, |run, t, _| if t >= 9.0 { sizes[run] } else { 0.0 });
+            let found = found(&jumped);
+            let step = found.iter().find(|one| one.candidate.effect.kind == "offset_step");
+            let names: Vec<&str> = (step.iter().flat_map(|one| &one.intervals))
+                .map(|one| one.recording.as_str())
+                .collect();
+            let expected: Vec<&str> = (0..recordings)
+                .filter(|r| sizes[*r] > 0.0)
+                .map(|r| RECORDINGS[r])
+                .collect();
+            assert_eq!(names, expected, "seed {seed}, steps {sizes:?}");
+        }
     }
 }
 
