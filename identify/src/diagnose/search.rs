@@ -610,8 +610,8 @@ impl EffectSelector<'_> {
             }
             let news = set_difference(&trial.picks, accepted);
             let channels = self.affected_channels(&news);
-            // Twice the logarithm of the likelihood ratio must be small, with all channels as one, and with each channel
-            // relative to what is left there: a set that explains other channels is no simpler explanation of these.
+            // Twice the logarithm of the likelihood ratio must be small, for the sum of all squares and for the variances
+            // of the channels: an effect at one drive does not replace an effect at another.
             let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
             if chosen.1.effective_samples * ratio.ln() > SIMPLER_SET_MOST_LOSS
                 || self.likelihood_loss(&chosen.0.picks, &trial.picks) > SIMPLER_SET_MOST_LOSS

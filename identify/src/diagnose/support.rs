@@ -15,9 +15,9 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::thresholds::{
-    CLEAR_LEAST_DEVIATIONS, ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T, ODDS_PER_UNEXPLAINED,
-    PROBABILITY_MOST, SUPPORT_GAIN_RANGE, SUPPORT_GAIN_REFERENCE, SUPPORT_T_RANGE, SUPPORT_T_REFERENCE,
-    UNCLEAR_MOST_PROBABILITY,
+    CANCELLING_MOST_SHARE, CLEAR_LEAST_DEVIATIONS, ODDS_AT_REFERENCE, ODDS_OF_ALTERNATIVE, ODDS_PER_GAIN, ODDS_PER_T,
+    ODDS_PER_UNEXPLAINED, PROBABILITY_MOST, SUPPORT_GAIN_RANGE, SUPPORT_GAIN_REFERENCE, SUPPORT_T_RANGE,
+    SUPPORT_T_REFERENCE, UNCLEAR_MOST_PROBABILITY,
 };
 use crate::signal::dot;
 
@@ -102,14 +102,14 @@ impl EffectSelector<'_> {
             .collect()
     }
 
-    /// Whether the terms of an effect cancel each other: the square of their sum is smaller than the sum of their squares.
+    /// Whether the terms of an effect cancel each other: the square of their sum is clearly below the sum of their squares.
     fn do_terms_cancel(&self, pick: &SelectedEffect, estimates: &[(f64, Option<f64>)]) -> bool {
         let gram = self.pool.gram(&pick.columns, &self.weights, FitScope::All);
         let values = DVector::from_iterator(estimates.len(), estimates.iter().map(|(value, _)| *value));
         let squares_of_terms: f64 = (values.iter().enumerate())
             .map(|(k, value)| value * value * gram[(k, k)])
             .sum();
-        (values.transpose() * &gram * &values)[0] < squares_of_terms
+        (values.transpose() * &gram * &values)[0] < CANCELLING_MOST_SHARE * squares_of_terms
     }
 
     /// Repeatable squares that a set leaves unexplained on some channels, relative to those that come back without a

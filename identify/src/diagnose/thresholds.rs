@@ -266,6 +266,10 @@ pub(super) const PROBABILITY_MOST: f64 = 0.99;
 /// A parameter differs clearly from zero if it exceeds this many standard deviations (1). By convention.
 pub(super) const CLEAR_LEAST_DEVIATIONS: f64 = 2.0;
 
+/// Terms of an effect cancel each other if the square of their sum is below this share of the sum of their squares (1). By
+/// judgement; a single term has 1.
+pub(super) const CANCELLING_MOST_SHARE: f64 = 0.5;
+
 /// Largest probability of an effect of which no parameter differs clearly from zero and whose terms cancel (1): it is possible, but not lacking.
 /// By judgement; a cable torque on EMPS with a step of the force has such values (`lab/measured/planted.py`).
 pub(super) const UNCLEAR_MOST_PROBABILITY: f64 = 0.4;

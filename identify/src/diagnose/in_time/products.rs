@@ -242,18 +242,10 @@ impl<'a> BlockProducts<'a> {
                 sum + profile[b] * own.rows(p * k, p)
             })
         };
-        // The factors of the set change with those of the shape.
-        let n = self.set.len();
-        let start = self.starts[shape];
-        let mut gram = self.set_products(&(0..self.problem.layout.samples()));
-        for (b, (_, products)) in blocks().enumerate() {
-            let less = products.view((0, start), (n, p)) * by_block(b);
-            for i in 0..n {
-                gram[(i, n)] -= less[i];
-                gram[(n, i)] -= less[i];
-            }
-        }
-        let (factors, _) = solve_gram(&gram);
+        let factors = self.refit_set(
+            shape,
+            blocks().enumerate().map(|(b, (_, products))| (products, by_block(b))),
+        );
         let channels = (0..self.weights.len()).filter(|d| self.acts_on(shape, *d));
         let of_channel = |d: usize| -> f64 {
             let mut rest = self.residual_with(d, &factors);
@@ -301,21 +293,13 @@ impl<'a> BlockProducts<'a> {
         let level = vec![1.0; blocks.len()];
         let profiles: [&[f64]; 2] = [&values, &level];
         let (own, _) = solve_gram(&self.reduce_blocks(shape, recording..recording + 1).gram(&profiles));
-        // The factors of the set change with those of the shape.
-        let n = self.set.len();
         let p = self.shapes[shape].len();
-        let start = self.starts[shape];
-        let mut gram = self.set_products(&(0..self.problem.layout.samples()));
-        for (k, profile) in profiles.iter().enumerate() {
-            for (factor, block) in profile.iter().zip(&cut.products) {
-                let less = *factor * block.view((0, start), (n, p)) * own.rows(p * k, p);
-                for i in 0..n {
-                    gram[(i, n)] -= less[i];
-                    gram[(n, i)] -= less[i];
-                }
-            }
-        }
-        let (factors, _) = solve_gram(&gram);
+        let by_block = values.iter().zip(&level).zip(&cut.products);
+        let by_block = by_block.map(|((change, level), products)| {
+            let sum = *change * own.rows(0, p) + *level * own.rows(p, p);
+            (products, sum)
+        });
+        let factors = self.refit_set(shape, by_block);
         let own = [own.rows(0, p), own.rows(p, p)].map(|part| part.iter().copied().collect::<Vec<f64>>());
         let decrease = self.decrease_by_sample(shape, &own, &factors, &cut.samples);
         let first = cut.samples.start;
@@ -340,6 +324,25 @@ impl<'a> BlockProducts<'a> {
         let begin = best(about(profile.begin), 1.0);
         let end = profile.end.map_or(cut.samples.end, |end| best(about(end), -1.0));
         begin..end.max(begin + 1)
+    }
+
+    /// Factors of the set that is fitted again beside a shape, which acts in some blocks: the products of each block with the
+    /// factors of the shape there.
+    fn refit_set<'b>(
+        &self,
+        shape: usize,
+        blocks: impl Iterator<Item = (&'b DMatrix<f64>, DVector<f64>)>,
+    ) -> DVector<f64> {
+        let (n, start) = (self.set.len(), self.starts[shape]);
+        let mut gram = self.set_products(&(0..self.problem.layout.samples()));
+        for (products, factors) in blocks {
+            let less = products.view((0, start), (n, factors.len())) * factors;
+            for i in 0..n {
+                gram[(i, n)] -= less[i];
+                gram[(n, i)] -= less[i];
+            }
+        }
+        solve_gram(&gram).0
     }
 
     /// Decrease of the weighted squared residual at the samples of a recording if a change acts. `own` are the factors of
