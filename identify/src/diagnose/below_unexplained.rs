@@ -2,14 +2,17 @@
 
 use super::SetResidual;
 use super::bench::{EffectSelector, SelectedEffect};
+use super::in_time::time_residual;
 use super::pool::FitScope;
+use super::problem::CandidateNature;
 use super::thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LARGE_RESIDUAL_SHARE};
 use crate::signal::dot;
 
 impl EffectSelector<'_> {
     /// Drops members that explain less than what stays unexplained, the weakest first, and returns the set with its
-    /// residual: there an unknown law is as likely as the effect. Two rules hold. The gains on all channels are compared with
-    /// the repeatable squares. Where all residuals are large, one channel must gain more than the squares that stay there.
+    /// residual: there an unknown law is as likely as the effect. Three rules hold. The gains on all channels are compared with
+    /// the repeatable squares. Where all residuals are large, one channel must gain more than the squares that stay there. The
+    /// gain of a drift or of a change in time is compared with the squares that follow the time only.
     pub(super) fn drop_below_unexplained(
         &mut self,
         mut picks: Vec<SelectedEffect>,
@@ -30,8 +33,16 @@ impl EffectSelector<'_> {
                         0.0
                     }
                 };
+                let in_time: Vec<f64> = if self.varies_in_time(&picks[i]) {
+                    (0..left.residual.len())
+                        .map(|d| self.squares_in_time(d, &left))
+                        .collect()
+                } else {
+                    vec![0.0; left.residual.len()]
+                };
+                let is_in_time = channels.iter().any(|d| in_time[*d] > 0.0);
                 let large: Option<Vec<f64>> = channels.iter().map(|d| self.large_squares(*d, &left)).collect();
-                if large.is_none() && channels.iter().all(|d| repeatable(*d) <= 0.0) {
+                if !is_in_time && large.is_none() && channels.iter().all(|d| repeatable(*d) <= 0.0) {
                     continue;
                 }
                 // Gain of the member: squares that come back when the set is fitted without it.
@@ -43,16 +54,18 @@ impl EffectSelector<'_> {
                 let gain = |d: usize| dot(&rest[d], &rest[d]) - dot(&left.residual[d], &left.residual[d]);
                 let weighted =
                     |of: &dyn Fn(usize) -> f64| channels.iter().map(|d| self.weights[*d] * of(*d)).sum::<f64>();
-                let of_repeatable = match weighted(&repeatable) {
+                let compared = |stays: f64| match stays {
                     stays if stays > 0.0 => weighted(&gain) / stays,
                     _ => f64::INFINITY,
                 };
+                let of_repeatable = compared(weighted(&repeatable));
+                let of_time = compared(weighted(&|d| in_time[d]));
                 // Where all residuals are large, one channel on which the member explains more is enough.
                 let of_large = large.map_or(f64::INFINITY, |large| {
                     let shares = channels.iter().zip(&large).map(|(d, stays)| gain(*d) / stays);
                     shares.fold(0.0, f64::max)
                 });
-                let share = of_repeatable.min(of_large);
+                let share = of_repeatable.min(of_large).min(of_time);
                 if share < EFFECT_LEAST_UNEXPLAINED_RATIO && least.as_ref().is_none_or(|(other, _)| share < *other) {
                     least = Some((share, fewer));
                 }
@@ -62,6 +75,22 @@ impl EffectSelector<'_> {
                 None => return (picks, left),
             }
         }
+    }
+
+    /// Whether a member is a drift or a change in time, which each recording has for itself.
+    fn varies_in_time(&self, pick: &SelectedEffect) -> bool {
+        let candidate = self.candidate(pick);
+        candidate.is_per_run && candidate.nature != CandidateNature::Effect
+    }
+
+    /// The squares of a channel that follow the time only and cannot be noise.
+    fn squares_in_time(&self, channel: usize, left: &SetResidual) -> f64 {
+        let rest = &left.residual[channel];
+        let again = left.repeatable_share[channel];
+        time_residual(self.problem, channel, rest, again).map_or(0.0, |found| {
+            let noise = found.noise.powi(2) * rest.len() as f64;
+            ((1.0 - again) * dot(rest, rest) - noise).max(0.0)
+        })
     }
 
     /// The squares of a channel beyond its noise if they are a large part of those of the force; `None` otherwise.

@@ -16,10 +16,14 @@ use super::named_zeros::{self, NamedZeros};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::thresholds::{
     CLAIMED_LENGTH_MOST_RESIDUAL, CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN,
+    UNEXPLAINED_DIFFERENCE_LEAST_GAIN,
 };
 
 /// Most times a search is repeated with the errors of constants that it claims.
 const MOST_CONSTANT_ROUNDS: usize = 3;
+
+/// Most differences between recordings of which each is tested by a search without it.
+const MOST_DIFFERENCES_TRIED: usize = 12;
 
 /// Disturbances that may stand in place of a difference between recordings: each recording has parameters of its own.
 const DRIFTS_AND_STEPS: [&str; 4] = ["offset_drift", "friction_drift", "offset_step", "gain_change"];
@@ -46,7 +50,9 @@ pub(super) fn search_effects(
     if !between.is_empty() {
         // A missing effect may look like a difference between recordings.
         let without = search.find(&[], None)?;
-        if !are_differences_needed(model, between, &answer, &without) {
+        if are_differences_needed(model, between, &answer, &without) {
+            answer = search.drop_needless_differences(between, answer)?;
+        } else {
             answer = without;
             between.clear();
         }
@@ -98,17 +104,30 @@ fn are_differences_needed(
     let has_further_effects = !without.diagnosis.effects.iter().all(is_known);
     let least_gain = if !has_further_effects && disturbances.any(is_in_their_place) {
         DIFFERENCE_LEAST_GAIN.recip()
+    } else if with.diagnosis.verdict == DiagnosisVerdict::Unexplained {
+        UNEXPLAINED_DIFFERENCE_LEAST_GAIN
     } else {
         DIFFERENCE_LEAST_GAIN
     };
-    // Relative to the same forces in both.
+    // Relative to the same forces in both, in the recordings that differ.
+    let samples = acting_samples(between);
     let sum = |answer: &DiagnosisSolution| -> f64 {
         let forces = without.diagnosis.budgets.iter().map(|budget| budget.force.powi(2));
-        let parts = answer.mean_square_residuals().zip(forces).enumerate();
+        let residuals = answer.diagnosis.residual.iter();
+        let square = |rest: &Vec<f64>| -> f64 { samples.iter().filter_map(|i| rest.get(*i)).map(|r| r * r).sum() };
+        let parts = residuals.zip(forces).enumerate();
         let parts = parts.filter(|(d, (_, force))| is_concerned(*d) && *force > 0.0);
-        parts.map(|(_, (square, force))| square / force).sum()
+        parts.map(|(_, (rest, force))| square(rest) / force).sum()
     };
     sum(without) >= least_gain * sum(with)
+}
+
+/// Indices of the samples in which differences between recordings act.
+fn acting_samples(between: &[RecordingDifference]) -> Vec<usize> {
+    let columns = || between.iter().flat_map(|one| one.force.0.iter().flatten());
+    let samples = columns().map(Vec::len).max().unwrap_or(0);
+    let acts = |i: &usize| columns().any(|force| force.get(*i).is_some_and(|force| *force != 0.0));
+    (0..samples).filter(acts).collect()
 }
 
 /// What all searches for missing effects in the same recordings have in common.
@@ -194,6 +213,33 @@ impl EffectSearch<'_> {
                 break;
             }
             answer = again;
+        }
+        Ok(answer)
+    }
+
+    /// Removes the differences between recordings that a search without them does not need, one by one, the smallest first,
+    /// and returns the answer for those that stay. `answer` is the answer with all of them.
+    ///
+    /// Fails as [`Model::diagnose`] does.
+    fn drop_needless_differences(
+        &self,
+        between: &mut Vec<RecordingDifference>,
+        mut answer: DiagnosisSolution,
+    ) -> Outcome<DiagnosisSolution> {
+        // One alone was compared with none.
+        if between.len() < 2 || between.len() > MOST_DIFFERENCES_TRIED {
+            return Ok(answer);
+        }
+        let forces: Vec<f64> = answer.diagnosis.budgets.iter().map(|budget| budget.force).collect();
+        between.sort_by(|a, b| b.relative_power(&forces).total_cmp(&a.relative_power(&forces)));
+        for k in (0..between.len()).rev() {
+            let one = between.remove(k);
+            let without = self.find(between, None)?;
+            if are_differences_needed(self.model, std::slice::from_ref(&one), &answer, &without) {
+                between.insert(k, one);
+            } else {
+                answer = without;
+            }
         }
         Ok(answer)
     }

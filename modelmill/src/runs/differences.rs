@@ -29,6 +29,16 @@ impl RecordingDifference {
         let values = self.force.0.get(drive).and_then(Option::as_ref);
         values.is_some_and(|values| values.iter().any(|force| *force != 0.0))
     }
+
+    /// Sum of its squared forces, each relative to the force of its drive; `forces` are those of the drives, `[channel]`.
+    pub(crate) fn relative_power(&self, forces: &[f64]) -> f64 {
+        let columns = self.force.0.iter().zip(forces).filter(|(_, force)| **force > 0.0);
+        let squares = |(values, force): (&Option<Vec<f64>>, &f64)| {
+            let values = values.iter().flatten();
+            values.map(|value| (value / force).powi(2)).sum::<f64>()
+        };
+        columns.map(squares).sum()
+    }
 }
 
 /// A change with its columns and their values.
