@@ -15,6 +15,7 @@ false      something else is claimed that the run without a fault does not claim
 
 import argparse
 import collections
+import functools
 import json
 import pathlib
 import re
@@ -90,21 +91,22 @@ def drive_of(model, column):
     return found[1] if found else column
 
 
-# A fault changes the tables, those of the fit first, and returns the kinds that name it, its places and its times.
+# A fault changes the tables, those of the fit first, and returns the kinds that name it, its places and its times. `weigh`
+# computes the forces of a load along the recordings.
 
 
-def no_fault(random, tables, columns, time):
+def no_fault(random, tables, columns, time, weigh):
     return ()
 
 
-def wrong_sign(random, tables, columns, time):
+def wrong_sign(random, tables, columns, time, weigh):
     column = strong(random, tables, columns)
     for table in tables:
         table[column] = -table[column]
     return {"wrong_sign"}, column, None
 
 
-def exchanged(random, tables, columns, time):
+def exchanged(random, tables, columns, time, weigh):
     if len(columns) < 2:
         return None
     a, b = (str(name) for name in random.choice(columns, 2, replace=False))
@@ -120,7 +122,7 @@ def strong(random, tables, columns):
 
 
 def push(share):
-    def plant(random, tables, columns, time):
+    def plant(random, tables, columns, time, weigh):
         column = strong(random, tables, columns)
         t, force = tables[0][time], tables[0][column]
         length = random.uniform(0.3, 0.8)
@@ -133,7 +135,7 @@ def push(share):
     return plant
 
 
-def step(random, tables, columns, time):
+def step(random, tables, columns, time, weigh):
     column = strong(random, tables, columns)
     for table in tables[:1]:
         t, force = table[time], table[column]
@@ -142,26 +144,55 @@ def step(random, tables, columns, time):
     return {"offset_step", "payload_change", "gain_change"}, column, None
 
 
-def gain(random, tables, columns, time):
+def gain(random, tables, columns, time, weigh):
     column = strong(random, tables, columns)
     for table in tables[1:]:
         table[column] = 1.2 * table[column]
     return {"drive_gain", "different_runs"}, column, None
 
 
-def dead(random, tables, columns, time):
+def dead(random, tables, columns, time, weigh):
     column = strong(random, tables, columns)
     table = tables[0]
     table[column] = np.where(table[time] > 0.5 * (table[time][0] + table[time][-1]), 0.0, table[column])
     return {"dead_channel"}, column, None
 
 
-def late(random, tables, columns, time):
+def late(random, tables, columns, time, weigh):
     """Forces come 15 ms later."""
     for table in tables:
         for column in columns:
             table[column] = np.interp(table[time] - 0.015, table[time], table[column])
     return {"time_delay", "force_lag"}, None, None
+
+
+def load(is_taken_up):
+    """A load on the last link: in all recordings but the first, or from a time of the first on."""
+
+    def plant(random, tables, columns, time, weigh):
+        forces = weigh()
+        if forces is None:
+            return None
+        sizes = [np.sqrt(sum(np.mean(table[name] ** 2) for name in columns)) for table in (tables[0], forces[0])]
+        factor = random.uniform(0.15, 0.3) * sizes[0] / sizes[1]
+        begin = random.uniform(0.35, 0.65)
+        interval = None
+        for k, (table, weight) in enumerate(zip(tables, forces)):
+            # The forces of the load end some samples after the begin and before the end of the recording.
+            inside = (table[time] >= weight["t"][0]) & (table[time] <= weight["t"][-1])
+            for name in table:
+                table[name] = table[name][inside]
+            t = table[time]
+            begins = t[0] + begin * (t[-1] - t[0]) if is_taken_up else t[0]
+            if k > 0 if is_taken_up else k == 0:
+                continue
+            if is_taken_up:
+                interval = (begins, t[-1])
+            for name in columns:
+                table[name] = table[name] + factor * (t >= begins) * np.interp(t, weight["t"], weight[name])
+        return {"payload_change"}, None, interval
+
+    return plant
 
 
 FAULTS = {
@@ -175,7 +206,44 @@ FAULTS = {
     "gain": gain,
     "dead": dead,
     "late": late,
+    "load": load(False),
+    "pick-up": load(True),
 }
+
+# A load of 1 kg on the last link of a machine whose forces are columns of its recordings.
+LOAD = """
+[[part]]
+name = "planted_load"
+on = "{link}"
+mass = 1.0
+centre = [0.03, 0.02, 0.05]
+inertia = {{ xx = 0.003, yy = 0.003, zz = 0.003 }}
+"""
+
+
+def load_forces(program, model, paths, columns, folder):
+    """The forces of a load along recordings, by the name of the column; `None` if columns are no forces of drives."""
+    text = model.read_text()
+    links = re.findall(r'\[\[frame\]\]\s*name = "(\w+)"', text)
+    drives = [drive_of(model, name) for name in columns]
+    maps = [re.search(rf'^{name} = "(.*)"', text.partition("[recording.columns]")[2], re.M) for name in drives]
+    if not links or any(one and not re.fullmatch(r"\w+", one[1]) for one in maps):
+        return None
+    head, _, mapping = text.partition("[recording.columns]")
+    loaded = folder / f"loaded-{model.name}"
+    loaded.write_text(head + LOAD.format(link=links[-1]) + (f"\n[recording.columns]{mapping}" if mapping else ""))
+    if not (folder / model.name).exists():
+        shutil.copy(model, folder)
+    forces = []
+    for path in paths:
+        each = []
+        for one in (loaded, model):
+            out = folder / "forces.csv"
+            subprocess.run([program, "evaluate", one, "--data", path, "--out", out], check=True, capture_output=True)
+            each.append(read_table(out))
+        with_load, without = each
+        forces.append({"t": with_load["t"]} | {c: with_load[d] - without[d] for c, d in zip(columns, drives)})
+    return forces
 
 
 def claims_of(answer):
@@ -200,7 +268,9 @@ def mark_of(answer, baseline, truth, model):
         kind, at, when, one = claim
         kinds_of = {kind} | {other["kind"] for other in one.get("indistinguishable_from", [])}
         # A push begins and ends with little force.
-        in_time = not interval or (when and interval[0] - 0.1 < when[0] and when[1] < interval[1] + 0.1)
+        # A load that is taken up is there to the end.
+        lasts = kind == "payload_change" and interval and when and abs(interval[0] - when[0]) < 0.2
+        in_time = not interval or lasts or (when and interval[0] - 0.1 < when[0] and when[1] < interval[1] + 0.1)
         return bool(kinds & kinds_of) and (place is None or place in at or not at) and in_time
 
     others = [claim for claim in claims if not names_it(claim) and claim[:2] not in known]
@@ -242,7 +312,8 @@ def main():
                 number = sum(ord(letter) for letter in machine + fault)
                 random = np.random.default_rng([options.seed, number])
                 tables = [dict(table) for table in plain]
-                truth = FAULTS[fault](random, tables, forces, time)
+                weigh = functools.partial(load_forces, options.program, model, paths, forces, folder)
+                truth = FAULTS[fault](random, tables, forces, time, weigh)
                 if truth is None:
                     continue
                 arguments = []

@@ -66,6 +66,20 @@ fn vibrations_are_no_contacts_and_no_delay() {
     assert_eq!(answer["verdict"], "unexplained");
 }
 
+/// In one of these recordings both joints swing in one mode, and a quarter of the torque is not explained by any model. Other
+/// friction, another load and a drifting zero were claimed, which explained less than what stays unexplained.
+#[test]
+fn an_unexplained_double_pendulum_has_no_differences_between_recordings() {
+    let names = [0, 1, 2, 3, 4].map(|k| format!("trajectory_0{k}.csv"));
+    let Some((folder, runs)) = recordings("double-pendulum", &names.each_ref().map(String::as_str)) else {
+        return;
+    };
+    let model = format!("{folder}/dp_A_full.toml");
+    let (answer, _) = diagnosed(&model, &runs[..4], runs.last());
+    assert_eq!(answer["verdict"], "unexplained");
+    assert_eq!(claimed_kinds(&answer), ["outliers"]);
+}
+
 /// The torque of this pendulum follows its motion in some recordings only.
 #[test]
 fn a_pendulum_has_what_its_recordings_show() {
