@@ -67,9 +67,9 @@ pub(crate) fn first_suspect(recordings: &[&PreparedRecording]) -> Option<Suspect
     recordings.iter().find_map(|one| one.suspected_fault()).cloned()
 }
 
-/// The highest frequency at which the forces of all recordings can be compared, Hz. The preparation of a recording can
-/// set such a frequency: the cut-off of the filter, or the band of the motion. The result is the lowest of them; `None`
-/// if no recording has one.
+/// The frequency up to which the forces of all recordings can be compared, Hz. Each recording may have such a frequency
+/// from its preparation: the cut-off of the filter, or the band of the motion. The lowest one counts; `None` if no
+/// recording has one.
 pub fn band(data: &[RecordingSegment]) -> Option<f64> {
     let bands = data.iter().filter_map(|one| one.run.prepared.band_hz);
     bands.reduce(f64::min)

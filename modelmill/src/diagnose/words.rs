@@ -85,7 +85,8 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
     joined_by_and(&effects.iter().map(effect).collect::<Vec<_>>())
 }
 
-/// What an effect means at places whose value the model shares with others.
+/// The sentence for an effect that the model has already, with one value for several places: one place needs a value of
+/// its own.
 pub fn shared_value(effect: &LocatedEffect, sharing: &[String]) -> String {
     let at = joined_by_and(&effect.at);
     let all: Vec<String> = effect.at.iter().chain(sharing).cloned().collect();
@@ -586,7 +587,7 @@ fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     })
 }
 
-/// The faults that were corrected hypothetically, as sentences; the verdict on the corrected recordings follows.
+/// The faults for which a trial correction was made, as sentences; the verdict on the corrected recordings follows.
 pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
     let with = if corrected.len() == 1 {
         "With it corrected"
