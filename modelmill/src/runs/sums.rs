@@ -119,7 +119,8 @@ impl ReferenceFit {
         self.values.as_slice()
     }
 
-    /// Normal equations of each drive over the reference runs, from rows that are not scaled by their noise.
+    /// Normal equations of each drive over the reference runs. Unlike those of [`RunSums`], their rows are not divided
+    /// by the standard deviation of the noise.
     pub fn sizes(&self) -> &[NormalEquations] {
         &self.sizes.0
     }
