@@ -148,8 +148,8 @@ impl TourText {
              in the library: wrong lengths, and faults of signals, such as a drift, a wrong gain or a wrong zero of an encoder. \
              These are {} in all. modelmill fits sets of candidates, together with the base parameters, to one recording. An \
              effect is accepted only if it also reduces the error on a second recording, which is not fitted (the validation \
-             run). Step 2 used this validation run, and its error was {} with nominal parameters. With estimated base parameters \
-             the error is {}, before any effect is added.",
+             run). Step 2 used this validation run: with nominal parameters, the error was {}. With estimated base parameters, it \
+             is {} before any effect is added.",
             count(all.len(), "candidate", "candidates"),
             percent(seen.compared.figures.nrms),
             percent(findings.diagnosis.steps.first().map(|step| step.check))
