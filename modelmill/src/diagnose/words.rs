@@ -57,7 +57,7 @@ pub fn kind(name: &str) -> String {
         "constant_error" => "wrong length or angle".to_owned(),
         // Candidates of this kind are searched only if the friction of the model is fixed.
         "different_runs" => "friction that differs from the fixed values".to_owned(),
-        "lumped_mass_placement" => "consistent position of a lumped mass".to_owned(),
+        "lumped_mass_placement" => "consistent placement of a lumped mass".to_owned(),
         "periodic_in_time" => "sinusoidal disturbance".to_owned(),
         "two_point_element" => "spring or damper between two points".to_owned(),
         "untied_part" => "separate parameters instead of shared ones".to_owned(),

@@ -287,8 +287,8 @@ impl TourText {
         }
         self.line("");
         self.paragraph(&format!(
-            "Error on the validation run, relative to the force (nrms), on a logarithmic scale. The last line ({}) is a value \
-             for all recordings together.",
+            "Error on the validation run, relative to the force (nrms), on a logarithmic scale. The last line ({}) is \
+             computed from all recordings together.",
             words::floor_label(noise)
         ));
     }
