@@ -27,7 +27,7 @@ impl Model {
     /// Writes the values of a fit into the text of the model's file, in place of those of an earlier fit; everything
     /// else stays as it is, byte for byte. `file` is the name of the fit in messages.
     ///
-    /// Fails when the fit is one of another model.
+    /// Fails if the fit belongs to another model.
     ///
     /// ```no_run
     /// use std::path::Path;

@@ -67,9 +67,9 @@ pub(crate) fn first_suspect(recordings: &[&PreparedRecording]) -> Option<Suspect
     recordings.iter().find_map(|one| one.suspected_fault()).cloned()
 }
 
-/// The highest frequency at which the forces of all recordings can be compared, Hz. The preparation of a recording can
-/// set such a frequency: the cut-off of the filter, or the band of the motion. The result is the lowest of them; `None`
-/// if no recording has one.
+/// The frequency up to which the forces of all recordings can be compared, Hz. Each recording may have such a frequency
+/// from its preparation: the cut-off of the filter, or the band of the motion. The lowest one counts; `None` if no
+/// recording has one.
 pub fn band(data: &[RecordingSegment]) -> Option<f64> {
     let bands = data.iter().filter_map(|one| one.run.prepared.band_hz);
     bands.reduce(f64::min)
@@ -266,8 +266,8 @@ pub(crate) fn region_range(region: &ErrorRegion, unit: &str) -> String {
     format!("between {low} and {high}{separator}{unit}{around}")
 }
 
-/// A variable in words by its name: `the length of spindle_left` for `spindle_left_length`. Coordinates, their rates
-/// and accelerations, and the time keep their names.
+/// A variable in words by its name: `the length of spindle_left` for `spindle_left_length`, `the velocity theta1_d`.
+/// Coordinates and the time keep their names.
 pub(crate) fn variable_phrase(model: &Model, name: &str) -> String {
     let mut drives = model.derivation.mechanism.drives.iter().enumerate();
     let phrase = drives.find_map(|(d, drive)| {
@@ -281,7 +281,22 @@ pub(crate) fn variable_phrase(model: &Model, name: &str) -> String {
         };
         Some(format!("the {quantity} of {}", drive.name))
     });
-    phrase.unwrap_or_else(|| name.to_owned())
+    phrase.unwrap_or_else(|| match derivative_word(model, name) {
+        Some(word) => format!("the {word} {name}"),
+        None => name.to_owned(),
+    })
+}
+
+/// The word for a derivative of a coordinate by its name, such as `velocity` for `theta1_d`; `None` for other variables
+/// and for quaternions, whose rates are components of an angular velocity.
+fn derivative_word(model: &Model, name: &str) -> Option<&'static str> {
+    let (of, word) = match name.strip_suffix("_dd") {
+        Some(of) => (of, "acceleration"),
+        None => (name.strip_suffix("_d")?, "velocity"),
+    };
+    let mut coordinates = model.derivation.mechanism.coordinates.iter();
+    let coordinate = coordinates.find(|c| c.name == of)?;
+    (coordinate.motion.unit() != "1").then_some(word)
 }
 
 /// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the

@@ -71,9 +71,8 @@ impl Error {
         }
     }
 
-    /// The error as a message, whose remedies can be formatted for any reader. For an invalid model file it is plain
-    /// text with excerpts of the file, with remedies in the Rust form; use [`Error::spell`] to get them in another
-    /// form.
+    /// The error as a message whose remedies can be formatted for any reader, with one exception: for an invalid model
+    /// file, the remedies are in the Rust form. [`Error::spell`] has them in every form.
     pub fn message(&self) -> Message {
         match self {
             Self::Model(failure) => failure.render(false).into(),

@@ -10,7 +10,7 @@
 //!
 //! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. Their recommendations, such
 //! as adding an effect to the model file, are written in the syntax of the caller. A [`print::StepSpelling`] chooses
-//! it: commands of the program, Python calls, or words for callers of this Rust library
+//! the syntax: commands of the program, Python calls, or words for callers of this Rust library
 //! ([`print::LibrarySpelling`]).
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its

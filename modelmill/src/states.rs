@@ -240,10 +240,10 @@ impl ModelFunctions {
         Ok(out)
     }
 
-    /// A function at one state, without the cost of preparing lists of states: positions, rates, accelerations and
-    /// forces of the drives, each complete or empty if the function does not read it. `out` has as many numbers as the
-    /// function. Returns false if [`ModelFunctions::evaluate_at`] must be used instead; `out` is then not valid. That
-    /// method states faults, and can evaluate loops that are solved by Newton's method.
+    /// A function at one state, faster than [`ModelFunctions::evaluate_at`]. `state` contains positions, rates,
+    /// accelerations and forces of the drives; an input that the function does not read may be empty. The result is
+    /// written to `out`. Returns false if [`ModelFunctions::evaluate_at`] must be used instead; `out` is then not
+    /// valid. That method states faults, and can evaluate loops that are solved by Newton's method.
     ///
     /// Fails when the function cannot be derived.
     pub fn evaluate_single(

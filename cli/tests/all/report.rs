@@ -65,7 +65,7 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
         // The words of these kinds are not their names.
         let kind = match candidate["kind"].as_str().expect("a kind") {
             "constant_error" => "wrong length or angle".to_owned(),
-            "lumped_mass_placement" => "correction of the moment of a lumped mass".to_owned(),
+            "lumped_mass_placement" => "consistent placement of a lumped mass".to_owned(),
             "two_point_element" => "spring or damper between two points".to_owned(),
             "untied_part" => "separate parameters instead of shared ones".to_owned(),
             name => name.replace('_', " "),
@@ -264,7 +264,7 @@ fn the_tour_tells_the_story_and_writes_its_files() {
         "rod inertia (spindle_left, spindle_right)",
         "+kind = \"rod_inertia\"",
         "Identify again: the error falls",
-        "correction of the moment of a lumped mass (R3m, R3m_right)",
+        "consistent placement of a lumped mass (R3m, R3m_right)",
         "32.1 %",
         "report-paper.html",
     ] {

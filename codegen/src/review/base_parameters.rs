@@ -263,7 +263,7 @@ pub(super) fn base_parameters(page: &mut PageDocument, derivation: &Derivation, 
         )));
         if let Some(condition) = n.condition {
             line.push(text(format!(
-                " The condition number over these states is {condition:.3}; that along a recording differs."
+                " The condition number over these states is {condition:.3}; along a recording it is different."
             )));
         }
     }

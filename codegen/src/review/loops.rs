@@ -113,15 +113,15 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
         })
         .collect();
     let mut says =
-        "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
+        "Their rates and accelerations are the solutions of linear equations, the derivatives of the closure equations."
             .to_owned();
     // Determinants that are too long are not listed.
     if determinants.is_empty() {
-        says.push_str(" A pose where their matrix is singular is reported.");
+        says.push_str(" Poses where the matrix of these equations is singular are reported.");
     } else {
         says.push_str(
-            " A pose is singular if a determinant of these equations or of the drives' Jacobian is zero. \
-             Such a pose is reported. The determinants are:",
+            " Poses where a determinant of these equations or of the drives' Jacobian is zero are singular, and are \
+             reported. The determinants are:",
         );
     }
     page.paragraph([text(says)]);

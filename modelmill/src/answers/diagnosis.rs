@@ -23,7 +23,8 @@ pub(crate) struct DiagnosisAnswer {
     pub(crate) budget: IndexMap<String, DriveBudgetAnswer>,
     /// Faults of the recordings that are no errors of the model.
     pub(crate) disturbances: Vec<DisturbanceAnswer>,
-    /// Faults of the recordings that were corrected hypothetically; all other findings hold for the corrected recordings.
+    /// Faults of the recordings for which a trial correction was made (in memory). All other findings hold for the
+    /// corrected recordings.
     pub(crate) corrected: Vec<CorrectedFaultAnswer>,
     /// Faults of the recordings that could not be corrected; nothing else is stated then.
     pub(crate) unresolved: Vec<CorrectedFaultAnswer>,

@@ -24,8 +24,8 @@ impl DiagnosisFindings {
     /// The text of the completed model file, in which the effects found are added to the given one. It is the given file if
     /// no effect is missing.
     ///
-    /// Fails where the findings do not state what is missing: if the recordings or the direction of gravity in the model
-    /// file have a fault, also one that was corrected hypothetically, and if the effects contradict the model file.
+    /// Fails if a recording or the direction of gravity in the model file has a fault, even if a trial correction was
+    /// made. Fails also if the effects contradict the model file.
     pub fn completed_model(&self) -> Outcome<&str> {
         let has_fault = !self.unresolved.is_empty() || !self.corrected.is_empty();
         if has_fault || words::has_suspicion(&self.diagnosis) {

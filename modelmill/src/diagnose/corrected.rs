@@ -252,8 +252,8 @@ fn merge_faults(all: impl Iterator<Item = SuspectedFault>) -> Vec<SuspectedFault
 }
 
 impl DiagnosisFindings {
-    /// The verdict with figures, as sentences. It starts with faults of the recordings, which are corrected or leave
-    /// nothing else to state.
+    /// The verdict with figures, as sentences. Faults of the recordings come first. If one of them could not be
+    /// corrected, the verdict states nothing else.
     pub fn verdict_text(&self) -> String {
         let says = if self.unresolved.is_empty() {
             let verdict = words::verdict(&self.diagnosis, self.channels(), self.validation);
@@ -317,7 +317,7 @@ impl DiagnosisFindings {
         }
     }
 
-    /// All disturbances: faults that were corrected hypothetically, then all others.
+    /// All disturbances, those with a trial correction first.
     pub fn disturbances(&self) -> Vec<Disturbance> {
         let corrected = self.corrected.iter().map(SuspectedFault::disturbance);
         corrected.chain(self.diagnosis.disturbances.iter().cloned()).collect()

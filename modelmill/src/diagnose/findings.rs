@@ -100,8 +100,8 @@ pub struct DiagnosisFindings {
     /// Base parameters of bodies (not of effects) whose estimates differ from their nominal values. The largest
     /// difference comes first, in standard deviations of the estimate.
     pub off_nominal: Vec<OffNominalParameter>,
-    /// The second diagnosis, with all base parameters fixed at their nominal values. `None` if it was not requested,
-    /// was not needed because no estimate differs, or the first one has fixed them all already.
+    /// The second diagnosis, with all base parameters fixed at their nominal values. `None` if it was not requested, if
+    /// no estimate differs from its nominal value, or if all parameters were fixed in the first diagnosis, too.
     pub with_nominal: Option<NominalDiagnosis>,
     /// Errors of the geometry that explain as much as the effects in [`Self::missing`] together, the best first.
     /// They include errors of coordinates of points that the model file sets to zero.
@@ -129,7 +129,8 @@ pub struct DiagnosisFindings {
     pub validation: ValidationMethod,
     /// Notes on the model, on the recordings, and on estimates with an impossible sign.
     pub notes: Vec<RecordingNote>,
-    /// Faults of the recordings that were corrected hypothetically: all findings hold for the corrected recordings.
+    /// Faults of the recordings for which a trial correction was made (in memory). All findings hold for the corrected
+    /// recordings.
     pub corrected: Vec<SuspectedFault>,
     /// Faults that could not be corrected: several explain a recording equally well, or the correction of one fails.
     /// If there are any, the diagnosis reports no other findings.

@@ -171,9 +171,9 @@ pub struct LawEntry {
 /// A law with others that explain the recordings equally well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawHypothesis {
-    /// The simplest.
+    /// The simplest law.
     pub law: ProposedLaw,
-    /// Others, the best first.
+    /// Other laws that explain the recordings equally well, the best first.
     pub near_ties: Vec<ProposedLaw>,
 }
 

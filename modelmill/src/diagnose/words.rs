@@ -57,7 +57,7 @@ pub fn kind(name: &str) -> String {
         "constant_error" => "wrong length or angle".to_owned(),
         // Candidates of this kind are searched only if the friction of the model is fixed.
         "different_runs" => "friction that differs from the fixed values".to_owned(),
-        "lumped_mass_placement" => "correction of the moment of a lumped mass".to_owned(),
+        "lumped_mass_placement" => "consistent placement of a lumped mass".to_owned(),
         "periodic_in_time" => "sinusoidal disturbance".to_owned(),
         "two_point_element" => "spring or damper between two points".to_owned(),
         "untied_part" => "separate parameters instead of shared ones".to_owned(),
@@ -85,7 +85,8 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
     joined_by_and(&effects.iter().map(effect).collect::<Vec<_>>())
 }
 
-/// What an effect means at places whose value the model shares with others.
+/// The sentence for an effect that the model has already, with one value for several places: one place needs a value of
+/// its own.
 pub fn shared_value(effect: &LocatedEffect, sharing: &[String]) -> String {
     let at = joined_by_and(&effect.at);
     let all: Vec<String> = effect.at.iter().chain(sharing).cloned().collect();
@@ -230,16 +231,13 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
         // The figure is of all recordings together, so the error of one of them may be larger.
-        format!(
-            "The forces are noise-free: rounding causes an error of {floor} (rms over all recordings; in one recording it can be \
-             larger)."
-        )
+        format!("The forces are noise-free: errors of about {floor} are rounding.")
     } else {
         // Only then a reader asks how an error can be smaller.
         let last = diagnosis.steps.last();
         let is_below = last.is_some_and(|last| last.check < diagnosis.noise_floor);
         let of_all = if is_below {
-            " (rms over all recordings; in one recording it can be smaller or larger)"
+            " (all recordings together; one recording may have less)"
         } else {
             ""
         };
@@ -268,18 +266,16 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         }
         RejectionReason::LessLikelyThanNot => "possible, but less likely than not",
         RejectionReason::ExplainedBetter if has_findings => {
-            "with the effects found it would still lower the residual, but the search did not select it"
+            "would lower the residual further, but the search did not select it"
         }
         RejectionReason::ExplainedBetter => "it would lower the error, but the search did not select it",
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
-        RejectionReason::ExplainsNothing if has_findings => {
-            "with the effects found, it explains almost nothing of the residual"
-        }
+        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing in addition to the effects found",
         RejectionReason::ExplainsNothing => "explains almost none of the error",
         RejectionReason::OnlyNoiseRemains if has_findings => {
-            "with the effects found, the residual is only noise or rounding"
+            "not needed: the effects found leave only noise or rounding"
         }
         RejectionReason::OnlyNoiseRemains => "the residual is only noise or rounding",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
@@ -586,7 +582,7 @@ fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     })
 }
 
-/// The faults that were corrected hypothetically, as sentences; the verdict on the corrected recordings follows.
+/// The faults for which a trial correction was made, as sentences; the verdict on the corrected recordings follows.
 pub(crate) fn corrected_text(corrected: &[SuspectedFault]) -> String {
     let with = if corrected.len() == 1 {
         "With it corrected"

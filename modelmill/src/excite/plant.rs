@@ -14,8 +14,8 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 const SINGULARITIES: [&str; 2] = ["singularity of the loops", "singularity of the drives"];
 
 /// The fraction of a limit that a trajectory uses, 1 at the limit. For a range, it is the largest distance from the
-/// middle, divided by half the range. For a least singular value, it is the limit divided by the smallest value along
-/// the trajectory.
+/// middle, divided by half the range. For the distance from singular poses (`singularity` in the model file), it is the
+/// limit divided by the smallest singular value along the trajectory.
 pub fn used_fraction(margin: &LimitMargin) -> f64 {
     if SINGULARITIES.contains(&margin.name.as_str()) {
         1.0 / (1.0 - margin.excess).max(0.0)

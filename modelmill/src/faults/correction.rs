@@ -63,7 +63,7 @@ pub(crate) enum ColumnOperation {
     Exchange(Vec<(String, String, [ColumnScaling; 2])>),
 }
 
-/// What corrects a fault hypothetically.
+/// The trial correction of a fault.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum FaultCorrection {
     /// Columns of the recording change.

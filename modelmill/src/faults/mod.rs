@@ -56,7 +56,8 @@ pub enum RecordingFaultKind {
     Wrapped,
     /// A force reads zero although the model predicts one.
     DeadChannel,
-    /// A force stays at one value while the machine moves: all other readings have noise, or the model predicts another.
+    /// A force stays at one value for some time while the machine moves, although it is noisy at other times, or
+    /// although the model predicts another value.
     FrozenForce,
     /// The largest or smallest readings of a force repeat one number, because the signal is clipped at this number.
     Saturation,
@@ -151,7 +152,7 @@ impl SuspectedFault {
         }
     }
 
-    /// Whether it can be corrected hypothetically.
+    /// Whether a trial correction is possible.
     pub fn is_correctable(&self) -> bool {
         self.correction.is_some()
     }

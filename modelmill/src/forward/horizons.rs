@@ -25,9 +25,9 @@ pub struct ForwardComparison {
     pub is_angle: Vec<bool>,
     /// The errors, the shortest horizon first; the last one is the longest whole run.
     pub horizons: Vec<HorizonError>,
-    /// The longest time over which a disturbance of the first state grows by less than a factor of 100, s: over
-    /// longer horizons, the errors do not show whether the model is correct. `None` if it does not grow that much within the
-    /// recordings.
+    /// The longest time over which an error of the initial state grows by less than a factor of 100, s. Over longer
+    /// horizons, the position errors do not show whether the model is correct. `None` if the factor is not reached
+    /// within the recordings.
     pub longest_horizon: Option<f64>,
 }
 

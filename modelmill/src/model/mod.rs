@@ -559,8 +559,8 @@ impl Model {
         self.identified[k]
     }
 
-    /// Whether a base parameter has a nominal value: it was identified, or the file gives nominal values, which may be
-    /// zero, for all factors of one of its products.
+    /// Whether a base parameter has a nominal value: it was identified, or the file gives values for all factors of at
+    /// least one of its products. These values may be zero.
     pub fn has_nominal(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;

@@ -54,9 +54,8 @@ const HIGH_CONDITION: f64 = 1e6;
 pub struct SampledRank {
     /// Rank, number of states and condition number.
     pub numeric_rank: NumericRank,
-    /// Ratio of two singular values: the smallest that contributes to the rank, and the next smaller one. The level of
-    /// rounding replaces the second if it is higher, or if there is no smaller one. Below about 1e3 the rank is
-    /// uncertain.
+    /// The smallest singular value that counts for the rank, divided by the next smaller one, or by the level of
+    /// rounding if that is higher. Below about 1e3 the rank is uncertain.
     pub gap: f64,
     /// Number of random states that were left out because the model is singular or undefined there.
     pub left_out: usize,

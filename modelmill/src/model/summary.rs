@@ -81,7 +81,7 @@ impl Model {
 /// Contents of a model.
 #[derive(Clone, Debug)]
 pub struct ModelSummary {
-    /// Number of parts.
+    /// Number of bodies (tables `[[part]]` of the file).
     pub bodies: usize,
     /// Number of lumped masses.
     pub lumped_masses: usize,

@@ -25,8 +25,8 @@ pub struct OptionDeclaration<T: 'static> {
     pub flag: &'static str,
     /// What stands for its value in help, such as `HZ`; empty for a switch.
     pub placeholder: &'static str,
-    /// What it does. `{name}` refers to an option of the same list, `{name=value}` to one with a value;
-    /// [`OptionDeclaration::spell_help`] spells them.
+    /// What it does. `{name}` refers to an option of the same list, `{name=value}` to an option with a value;
+    /// [`OptionDeclaration::spell_help`] replaces them.
     pub help: &'static str,
     /// Names of options that must not be given together with it.
     pub excludes: &'static [&'static str],
@@ -61,7 +61,7 @@ pub enum OptionKind<T: 'static> {
         range: (usize, usize),
         /// The sentence about an invalid value.
         expected: &'static str,
-        /// The value that stands for no value, if there is one.
+        /// The value that has the same meaning as omitting the option, if there is one.
         default: Option<usize>,
     },
     /// Two integers; a single one stands for both.
@@ -202,15 +202,15 @@ impl<T> OptionDeclaration<T> {
         value.ok_or_else(|| self.expected())
     }
 
-    /// The help with references to other options as a front end spells them: `spell` gets the name of an option and
-    /// its value, if one is recommended.
+    /// The help text, in which `spell` writes each reference to another option. It gets the name of the option, and a
+    /// value if one is recommended.
     pub fn spell_help(&self, spell: &dyn Fn(&str, Option<&str>) -> String) -> String {
         spell_references(self.help, spell)
     }
 }
 
 impl<T> ChoiceValue<T> {
-    /// The help with references to other options as a front end spells them, as [`OptionDeclaration::spell_help`].
+    /// The help text, as [`OptionDeclaration::spell_help`] writes it.
     pub fn spell_help(&self, spell: &dyn Fn(&str, Option<&str>) -> String) -> String {
         spell_references(self.help, spell)
     }

@@ -39,7 +39,7 @@ pub fn kind<'a>(kinds: &'a [EffectKind], name: &str) -> Outcome<&'a EffectKind> 
     found.ok_or_else(|| unknown_kind_error(name, kinds))
 }
 
-/// Other kinds whose first sentence has the name of a kind as a word: a spring may also be an element between points.
+/// Other kinds whose first sentence contains the name of this kind, such as `two_point_element` for `spring`.
 pub fn related_kinds<'a>(kinds: &'a [EffectKind], name: &str) -> Vec<&'a EffectKind> {
     let word = name.replace('_', " ");
     let others = kinds.iter().filter(|kind| kind.name != name);

@@ -227,8 +227,6 @@ impl DiagnosisFindings {
             ],
             &rows,
         ));
-        // The noise floor follows the table, as the lower bound of all errors.
-        lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
         self.sums_text(&mut lines);
         self.geometry_alternatives_text(style, &mut lines);
@@ -314,7 +312,7 @@ impl DiagnosisFindings {
             }
         }
         lines.push(String::new());
-        lines.push(style.bold("Residual and subtracted disturbances of each drive (rms), relative to its rms force"));
+        lines.push(style.bold("Residual of each drive, split by origin (rms, relative to its rms force)"));
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
@@ -336,8 +334,8 @@ impl DiagnosisFindings {
                 ("drive", ColumnAlignment::Left),
                 ("noise or rounding", ColumnAlignment::Right),
                 ("varies with time only", ColumnAlignment::Right),
-                ("repeatable, unexplained", ColumnAlignment::Right),
-                ("subtracted disturbances", ColumnAlignment::Right),
+                ("model error", ColumnAlignment::Right),
+                ("subtracted before the fit", ColumnAlignment::Right),
             ],
             &rows,
         ));

@@ -13,7 +13,7 @@ impl ColumnProposal {
         let pairs = self
             .columns
             .iter()
-            .map(|one| json!({ "name": one.ours, "column": one.theirs, "reason": one.reason, "guess": one.is_guess }));
+            .map(|one| json!({ "name": one.name, "column": one.column, "reason": one.reason, "guess": one.is_guess }));
         json!({
             "model": self.model,
             "columns": pairs.collect::<Vec<_>>(),
@@ -33,7 +33,7 @@ impl ColumnProposal {
         }
         text.push_str("[recording.columns]\n");
         let lines: Vec<(String, &ProposedColumn)> = (self.columns.iter())
-            .map(|one| (format!("{} = {}", toml_key(&one.ours), toml_text(&one.theirs)), one))
+            .map(|one| (format!("{} = {}", toml_key(&one.name), toml_text(&one.column)), one))
             .collect();
         let width = lines.iter().map(|(line, _)| line.chars().count()).max().unwrap_or(0);
         for (line, one) in &lines {

@@ -271,7 +271,7 @@ pub(crate) fn verdict_text(run: &RunReport) -> Message {
         // Changes of some drives do not show what the undecided drives did.
         RunVerdict::Changed if run.undecided.is_empty() => Message::default(),
         RunVerdict::Changed => message!("For some drives the runs cannot show a change. {}", unknown),
-        RunVerdict::CannotTell => message!("The runs cannot show whether anything changed. {}", unknown),
+        RunVerdict::Undecided => message!("The runs cannot show whether anything changed. {}", unknown),
         RunVerdict::DifferentWithoutCause => message!(
             "The runs differ, but no {other}single change explains how: the base parameters below differ by more than noise and \
              model error. The model may lack an effect that depends on the motion. Find it with {}, then compare the runs again.{}",

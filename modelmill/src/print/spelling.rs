@@ -25,7 +25,7 @@ pub trait StepSpelling: RemedySpelling {
         format!("{effect}, with the library {library}")
     }
 
-    /// Whether the effects found were added already, so that this is no next step.
+    /// Whether the effects found were added already. Adding them is then not listed as a next step.
     fn has_added_effects(&self) -> bool {
         false
     }

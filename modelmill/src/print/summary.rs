@@ -94,8 +94,8 @@ impl ModelCheck {
         }
     }
 
-    /// The next step: values for a model that has not all of them, else the comparison with a recording; `None` for a model
-    /// without parameters that drives can show, and for one with impossible values.
+    /// The next step: estimate the base parameters if nominal values are missing, otherwise compare the model with a
+    /// recording. `None` if the model has no base parameters or no drives, or if values are impossible.
     pub fn next_step(&self) -> Option<Message> {
         let model = &self.model;
         if model.base.is_empty() || model.drives().is_empty() || !self.impossible_values().is_empty() {

@@ -2,8 +2,7 @@
 //!
 //! [`runs_page`] is the page of differences between runs, [`atlas()`] that of many mechanisms.
 //!
-//! `words`, `tables`, and pictures (`steps`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures need no
-//! script; with `page.js` curves can be zoomed and tables sorted.
+//! The pictures need no script; with the script `page.js`, curves can be zoomed and tables can be sorted.
 
 mod atlas;
 mod curves;

@@ -138,8 +138,7 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. \
-         The noise or rounding in the picture and in the summary is the rms value over all recordings; in one recording it can \
-         be smaller or larger.</p>\n<ul>\n\
+         The noise or rounding is that of all recordings together.</p>\n<ul>\n\
          <li><i>decrease of the squared error</i>: relative to the step before, evaluated {} and only for the drives on \
          which the added effects act.</li>\n\
          <li><i>t value of the decrease</i>: its mean over blocks of time, divided by its standard error.</li>\n\
@@ -352,8 +351,8 @@ fn candidates(findings: &DiagnosisFindings) -> String {
         "<p>The table lists every kind of effect and disturbance at every place (drive, joint, point, body) where it can act. \
          <i>squared error explained if added alone</i>: the share of the squared error of the given model that the candidate \
          removes without any other effect. <i>gain in addition to the effects found</i>: the share of the squared residual that \
-         the candidate removes if it is added to the model with these effects. For a found effect, the reference is the model with \
-         all other found effects.\
+         the candidate removes if it is added to the model with these effects. For an effect that was found, all other effects found are added \
+         first.\
          <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )
@@ -370,9 +369,8 @@ fn parameters(findings: &DiagnosisFindings) -> String {
             html.push_str(
                 "<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive \
                  are divided by the standard deviation of its residual. The standard deviations in this section are computed \
-                 from the residual alone, and allow for its correlation in time. Those in the section of missing effects are \
-                 computed from the residual or from the upper bound of the noise, whichever is larger. So the two sections may \
-                 give different standard deviations of the same parameter.</p>\n",
+                 from the residual alone, and allow for its correlation in time. The section of missing effects also uses the \
+                 upper bound of the noise, so its standard deviations may differ.</p>\n",
             );
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
@@ -409,11 +407,9 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
     }
     // The summary of the folded part names the model.
     let what = if findings.after.version().is_some() {
-        "The model with the effects"
+        "Equations of the model with the effects"
     } else {
-        "The model"
+        "Equations of the model"
     };
-    format!(
-        "<details class=\"embedded\">\n<summary>{what}: derivation, p_g, dependencies, p_min, programs</summary>\n{inner}</details>\n",
-    )
+    format!("<details class=\"embedded\">\n<summary>{what}</summary>\n{inner}</details>\n",)
 }

@@ -56,7 +56,7 @@ fn summary(compared: &RunsComparison) -> String {
     let with_verdict = |verdict: RunVerdict| later_runs().filter(|run| run.verdict() == verdict).count();
     let changed =
         later_runs().filter(|run| !run.changes.is_empty()).count() + with_verdict(RunVerdict::DifferentWithoutCause);
-    let unknown = with_verdict(RunVerdict::CannotTell);
+    let unknown = with_verdict(RunVerdict::Undecided);
     // The colour of the verdict.
     let class = if changed == 0 && unknown == 0 && compared.points.is_empty() {
         "adequate"

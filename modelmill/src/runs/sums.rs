@@ -36,7 +36,8 @@ pub struct ReferenceFit {
     sizes: MeasuredMoments,
 }
 
-/// One run as additive statistics. The statistics of several runs are the sums of those of each run.
+/// The statistics of one run. They are additive: the statistics of several runs are the sums of those of the single
+/// runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSums {
     /// Number of samples that were used, after decimation.
@@ -46,9 +47,8 @@ pub struct RunSums {
     pub total: NormalEquations,
     /// The R factor of the base columns alone, over the same rows.
     pub base: RFactor,
-    /// Differences within this run, for comparison: parts of it are compared as if they were different runs. The value
-    /// is the largest sum of squares that a single change between them explains, divided by the effective number of
-    /// rows. A difference between two runs is a change only if it is clearly larger.
+    /// The largest apparent change between parts of this run: the sum of squares that it explains, divided by the
+    /// effective number of rows. A difference between two runs counts as a change only if it is clearly larger.
     pub within: f64,
     /// Residual of each drive relative to its force (rms over rms, 1), with base parameters fitted to this run alone.
     pub residual_ratios: Vec<f64>,
@@ -119,7 +119,8 @@ impl ReferenceFit {
         self.values.as_slice()
     }
 
-    /// Normal equations of each drive over the reference runs, from rows that are not scaled by their noise.
+    /// Normal equations of each drive over the reference runs. Unlike those of [`RunSums`], their rows are not divided
+    /// by the standard deviation of the noise.
     pub fn sizes(&self) -> &[NormalEquations] {
         &self.sizes.0
     }

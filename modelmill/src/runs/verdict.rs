@@ -19,7 +19,7 @@ pub enum RunVerdict {
     /// No change was found, and the forces of at least one drive would have shown one.
     Unchanged,
     /// No drive could show a change.
-    CannotTell,
+    Undecided,
 }
 
 impl RunVerdict {
@@ -29,7 +29,7 @@ impl RunVerdict {
             Self::Changed => "changed",
             Self::DifferentWithoutCause => "different",
             Self::Unchanged => "unchanged",
-            Self::CannotTell => "cannot_tell",
+            Self::Undecided => "cannot_tell",
         }
     }
 }
@@ -93,7 +93,7 @@ impl RunReport {
             return RunVerdict::Changed;
         }
         if self.undecided.len() >= self.drives {
-            return RunVerdict::CannotTell;
+            return RunVerdict::Undecided;
         }
         if !self.moved.is_empty() {
             return RunVerdict::DifferentWithoutCause;

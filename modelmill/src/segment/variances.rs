@@ -1,5 +1,5 @@
-//! Variances of the measured forces, if a recording has the columns `DRIVE_var`. For example, whoever averages a motion
-//! over many periods can compute them.
+//! Variances of the measured forces, if a recording has the columns `DRIVE_var`. Such a column can be computed, for
+//! example, by averaging a motion over many periods.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};

@@ -1,7 +1,8 @@
 //! Models with actuators: what can be known without a measured force, and estimates from servo logs.
 //!
 //! A model whose file has `[[actuator]]` goes in, with recordings of commands, currents or voltages. Out come base
-//! parameters and gains with standard deviations, the delay of each servo, and the numbers that fix the scale.
+//! parameters and gains with standard deviations, the delay of each servo, and the parameters whose values must be
+//! known to determine the scale.
 //!
 //! The equations are `H p - S k = 0`, with the gains `k` and the regressor `S` of the signals, see
 //! [`modelmill_spec::Mechanism::with_servo_equations`]. Without a known number

@@ -51,8 +51,8 @@ pub struct PanelStyle<'a> {
     pub limit: Option<f64>,
     /// Times of vertical lines, s.
     pub marks: &'a [f64],
-    /// Colour of the first curve, 0 to 2; the next curves have the next colours. It lets a quantity keep its colour in
-    /// panels without the curves before it.
+    /// Colour of the first curve, 0 to 2; the next curves have the next colours. With it, a quantity has the same
+    /// colour in all panels.
     pub first_colour: usize,
 }
 

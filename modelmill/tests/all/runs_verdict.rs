@@ -140,7 +140,7 @@ fn runs_that_show_nothing_are_no_proof_of_no_change() {
     let recordings = [300, 301].map(|seed| noisy(seed).record(&model, &model));
     let found = compare_runs(&model, &recordings.each_ref(), &RunsOptions::default());
     let second = &found.runs[1];
-    assert_eq!(second.verdict(), RunVerdict::CannotTell, "{second:#?}");
+    assert_eq!(second.verdict(), RunVerdict::Undecided, "{second:#?}");
     assert!(second.moved.is_empty() && second.undecided.len() == 4, "{second:#?}");
     let text = found.text(TerminalStyle::PLAIN, &LibrarySpelling);
     assert!(

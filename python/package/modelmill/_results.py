@@ -349,7 +349,7 @@ class Diagnosis(Result):
 
     @property
     def corrected(self) -> list[dict[str, Any]]:
-        """Faults of the recordings that were corrected hypothetically, and what to do; all findings hold for the corrected ones."""
+        """Faults for which a trial correction was made, and what to do; all findings hold for the corrected recordings."""
         corrected: list[dict[str, Any]] = self._object.get("corrected", [])
         return corrected
 

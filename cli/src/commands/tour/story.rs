@@ -148,8 +148,8 @@ impl TourText {
              in the library: wrong lengths, and faults of signals, such as a drift, a wrong gain or a wrong zero of an encoder. \
              These are {} in all. modelmill fits sets of candidates, together with the base parameters, to one recording. An \
              effect is accepted only if it also reduces the error on a second recording, which is not fitted (the validation \
-             run). Step 2 used this validation run: with the nominal parameters the error on it is {}. With base parameters \
-             estimated from the fitted recording, and without added effects, the error on the validation run is {}.",
+             run). Step 2 used this validation run: with nominal parameters, the error was {}. With estimated base parameters, it \
+             is {} before any effect is added.",
             count(all.len(), "candidate", "candidates"),
             percent(seen.compared.figures.nrms),
             percent(findings.diagnosis.steps.first().map(|step| step.check))
@@ -287,8 +287,8 @@ impl TourText {
         }
         self.line("");
         self.paragraph(&format!(
-            "Error relative to the force (nrms) on the validation run. The last line ({}) is the rms value over all recordings; \
-             in one recording it can be smaller or larger. The lengths of the bars are on a logarithmic scale.",
+            "Error on the validation run, relative to the force (nrms), on a logarithmic scale. The last line ({}) is \
+             computed from all recordings together.",
             words::floor_label(noise)
         ));
     }
@@ -297,13 +297,12 @@ impl TourText {
     pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
         self.heading("6  Diagnose a published model");
         self.paragraph(
-            "The paper that describes this robot reports an error of its model. It names two causes. The first is the positions of \
-             the point masses, which replace the coupling elements and the platform. The second is the contact points of the screws \
-             on the cranks. modelmill finds a third cause, in the equations of the paper: they give half of the platform's mass m4 \
-             to each coupler. In the balance of forces this half is at the end of the coupler (R3m or R3m_right). In the balance of moments \
-             it is at the coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines all \
-             three causes. The recording is a simulation of the same robot without rods. The base parameters are fixed at their \
-             nominal values (`--held`), as in step 2:",
+            "The paper that describes this robot reports an error of its model. modelmill finds a cause that the paper does not name. \
+             Each coupler carries half of the platform's mass m4 as a point mass, but the equations of the paper use two different \
+             points for it. In the balance of forces it is at the end of the coupler (R3m or R3m_right). In the balance of moments it is at the \
+             coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines this cause and those of the paper. The \
+             recording is a simulation of the same robot without rods. The base parameters are fixed at their nominal values \
+             (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;

@@ -26,9 +26,9 @@ const MOST_COLUMNS: usize = 500;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposedColumn {
     /// The name in the model.
-    pub ours: String,
-    /// The column, or an expression of it with its unit.
-    pub theirs: String,
+    pub name: String,
+    /// The column of the recording, with sign and unit if they are needed, such as `-tau1 [N mm]`.
+    pub column: String,
     /// Why it is proposed.
     pub reason: String,
     /// Whether the evidence is weak, so that the pair must be checked.

@@ -601,13 +601,13 @@ impl<'a> ColumnPairing<'a> {
             let pair = one.pair.as_ref()?;
             let sign = if pair.is_reversed { "-" } else { "" };
             let name = &self.signals[pair.signal].name;
-            let theirs = match &pair.unit {
+            let column = match &pair.unit {
                 Some(unit) => format!("{sign}{name} [{unit}]"),
                 None => format!("{sign}{name}"),
             };
             Some(ProposedColumn {
-                ours: one.name.clone(),
-                theirs,
+                name: one.name.clone(),
+                column,
                 reason: pair.reasons.join("; "),
                 is_guess: pair.is_guess,
             })
