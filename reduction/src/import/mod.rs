@@ -18,10 +18,12 @@ mod mjcf;
 mod mjcf_actuators;
 mod mjcf_attach;
 mod mjcf_compiler;
+mod mjcf_copies;
 mod mjcf_defaults;
 mod mjcf_equalities;
 mod mjcf_include;
 mod mjcf_meshes;
+mod mjcf_names;
 mod model_text;
 mod placed;
 mod rig_text;
@@ -175,7 +177,9 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
         ))
     })?;
     let readable = xml_repair::readable_xml(text);
-    let text = readable.as_ref();
+    let copied = mjcf_copies::expand_copies(&readable).map_err(ImportError)?;
+    xml_budget::check_xml_budget(&copied).map_err(ImportError)?;
+    let text = copied.as_str();
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {

@@ -4,6 +4,7 @@
 //! - `--` in a comment: comments are emptied.
 //! - Blank lines before the XML declaration: they are moved behind it.
 //! - No space between two attributes: a space is added.
+//! - A `<!DOCTYPE>`: it is emptied, since no entity of it is needed to read a robot.
 //! - A prefix that no `xmlns` declares, such as `drake:`: it is declared in the root element. The prefix of macros,
 //!   `xacro:`, is not, because macros must be expanded.
 
@@ -40,13 +41,16 @@ fn repair_xml(text: &str) -> String {
             _ if rest.starts_with("<!--") => to("-->"),
             _ if rest.starts_with("<![CDATA[") => to("]]>"),
             _ if rest.starts_with("<?") => to("?>"),
+            _ if rest.starts_with("<!DOCTYPE") => doctype_length(rest),
             _ if rest.starts_with("<!") => to(">"),
             _ => {
                 root_name_end = root_name_end.or(Some(out.len() + 1 + name_at_start(&rest[1..]).len()));
                 push_tag(rest, &mut out, &mut prefixes)
             }
         };
-        if rest.starts_with("<!--") {
+        if rest.starts_with("<!DOCTYPE") {
+            out.extend(rest[..length].matches('\n'));
+        } else if rest.starts_with("<!--") {
             let lines = rest[..length].matches('\n').count();
             out.extend(["<!--", &"\n".repeat(lines), "-->"]);
         } else if rest.starts_with("<!") || rest.starts_with("<?") {
@@ -69,6 +73,23 @@ fn repair_xml(text: &str) -> String {
     let blank = &text[..text.len() - body.len()];
     out.insert_str(declaration.map_or(0, |end| end + 2), blank);
     out
+}
+
+/// The length of the `<!DOCTYPE>` at the start of a text, with the declarations in brackets.
+fn doctype_length(text: &str) -> usize {
+    let mut quote = None;
+    let mut is_inside = false;
+    for (k, c) in text.char_indices() {
+        match (quote, c) {
+            (Some(open), _) if open == c => quote = None,
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[') => is_inside = true,
+            (None, ']') => is_inside = false,
+            (None, '>') if !is_inside => return k + 1,
+            _ => {}
+        }
+    }
+    text.len()
 }
 
 /// The name at the start of a text, up to white space or the sign that ends a name.
