@@ -15,6 +15,7 @@ use super::mjcf_compiler::{CompilerSettings, MjcfCompiler};
 use super::mjcf_defaults::MjcfDefaults;
 use super::mjcf_meshes::{LoadedMeshes, MeshFiles};
 use super::mjcf_names::GivenNames;
+use super::mjcf_of_urdf::ATTACHED_REMARK;
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
 use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
@@ -107,6 +108,9 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
             ));
         }
     }
+    // Remarks on attached files of another format.
+    let remarks = children(&root, ATTACHED_REMARK).filter_map(|node| node.attribute("text"));
+    reader.out.remarks.extend(remarks.map(str::to_owned));
     // The tree of bodies with their joints and inertias.
     for body in children(&root, "worldbody") {
         let inside = MjcfContext {

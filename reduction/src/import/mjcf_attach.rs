@@ -17,6 +17,7 @@ use super::mjcf_copies::expand_copies;
 use super::mjcf_defaults::MAIN_CLASS;
 use super::mjcf_include::{FILE_FOLDER, FileReader, expand_includes, folder_of, joined_path};
 use super::mjcf_meshes::name_of_file;
+use super::mjcf_of_urdf::mjcf_of_urdf;
 use super::thresholds::LARGEST_DESCRIPTION;
 use super::xml::{children, located_message, write_escaped};
 use super::xml_budget::check_xml_budget;
@@ -216,6 +217,12 @@ impl AttachedModels<'_> {
         self.unfinished.push(path.to_owned());
         let whole = self.expand(&text, folder_of(path), inside).map_err(in_file)?;
         self.unfinished.pop();
+        let whole = match Document::parse(&whole) {
+            Ok(document) if document.root_element().has_tag_name("robot") => {
+                mjcf_of_urdf(&document, path).map_err(in_file)?
+            }
+            _ => whole,
+        };
         check_xml_budget(&whole).map_err(in_file)?;
         self.expanded.insert(path.to_owned(), whole.clone());
         Ok(whole)
@@ -244,8 +251,12 @@ impl AttachedModels<'_> {
                     }
                     let readable = check_xml_budget(&text).ok().map(|()| readable_xml(&text));
                     let parsed = readable.as_deref().and_then(|text| Document::parse(text).ok());
-                    let name =
-                        parsed.and_then(|document| document.root_element().attribute("model").map(str::to_owned));
+                    // A URDF has its name in another attribute.
+                    let name = parsed.and_then(|document| {
+                        let root = document.root_element();
+                        let key = if root.has_tag_name("robot") { "name" } else { "model" };
+                        root.attribute(key).map(str::to_owned)
+                    });
                     name.unwrap_or_else(|| UNNAMED_MODEL.to_owned())
                 }
             };
@@ -268,7 +279,7 @@ impl AttachedModels<'_> {
         let root = inner.root_element();
         if root.tag_name().name() != "mujoco" {
             let says = format!(
-                "`{path}` is no MJCF; other formats are not attached here: save the complete model with MuJoCo (mj_saveLastXML)"
+                "`{path}` is neither MJCF nor URDF; other formats are not attached: save the complete model with MuJoCo (mj_saveLastXML)"
             );
             return Err(located_message(node, &says));
         }

@@ -225,13 +225,12 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
             .trim()
             .parse()
             .map_err(|_| located_message(node, "expected a number of copies in `count`"))?;
-        for tag in ["joint", "freejoint", "inertial"] {
-            if children(node, tag).next().is_some() {
-                return Err(located_message(
-                    node,
-                    &format!("<{tag}> cannot be a direct child of it"),
-                ));
-            }
+        if let Some(part) = find_part_of_body(node) {
+            let says = format!(
+                "<{}> cannot be copied alone: it belongs to the body around <replicate>",
+                part.tag_name().name()
+            );
+            return Err(located_message(&part, &says));
         }
         let three = |key: &str| node.attribute(key).map(|text| exact_numbers::<3>(node, key, text));
         let euler = three("euler").transpose()?.unwrap_or_default();
@@ -541,6 +540,15 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         }
         out.extend(["</", &element.tag, ">"]);
     }
+}
+
+/// An element inside a `<replicate>` that a body has once. Frames have no body.
+fn find_part_of_body<'a, 'i>(node: &Node<'a, 'i>) -> Option<Node<'a, 'i>> {
+    node.children().find_map(|child| match child.tag_name().name() {
+        "joint" | "freejoint" | "inertial" => Some(child),
+        "frame" | "replicate" => find_part_of_body(&child),
+        _ => None,
+    })
 }
 
 /// The kind of element that can be copied, to which an attribute of a tendon, equality or actuator refers.

@@ -24,6 +24,7 @@ mod mjcf_equalities;
 mod mjcf_include;
 mod mjcf_meshes;
 mod mjcf_names;
+mod mjcf_of_urdf;
 mod model_text;
 mod placed;
 mod rig_text;

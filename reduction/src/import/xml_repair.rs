@@ -79,17 +79,23 @@ fn repair_xml(text: &str) -> String {
 fn doctype_length(text: &str) -> usize {
     let mut quote = None;
     let mut is_inside = false;
-    for (k, c) in text.char_indices() {
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        if quote.is_none() && text[at..].starts_with("<!--") {
+            at = text[at..].find("-->").map_or(text.len(), |k| at + k + "-->".len());
+            continue;
+        }
+        at += c.len_utf8();
         match (quote, c) {
             (Some(open), _) if open == c => quote = None,
             (None, '"' | '\'') => quote = Some(c),
             (None, '[') => is_inside = true,
             (None, ']') => is_inside = false,
-            (None, '>') if !is_inside => return k + 1,
+            (None, '>') if !is_inside => break,
             _ => {}
         }
     }
-    text.len()
+    at
 }
 
 /// The name at the start of a text, up to white space or the sign that ends a name.
@@ -148,6 +154,23 @@ mod tests {
         let line = |text: &str, part: &str| text[..text.find(part).unwrap()].matches('\n').count();
         assert_eq!(line(&mended, "<robot"), line(faulty, "<robot"));
         assert_eq!(line(&mended, "<drake"), line(faulty, "<drake"));
+    }
+
+    #[test]
+    fn document_types_are_emptied_with_the_same_lines() {
+        for document_type in [
+            "<!DOCTYPE robot>",
+            "<!DOCTYPE robot SYSTEM \"a>b.dtd\">",
+            "<!DOCTYPE robot [\n <!ENTITY e '>'>\n <!-- ] -->\n]>",
+        ] {
+            let text = format!("<?xml version=\"1.0\"?>\n{document_type}\n<robot name=\"r\"/>\n");
+            assert!(Document::parse(&text).is_err());
+            let mended = repair_xml(&text);
+            let document = Document::parse(&mended).unwrap_or_else(|fault| panic!("{fault}: {mended}"));
+            assert_eq!(document.root_element().attribute("name"), Some("r"));
+            let line = |text: &str| text[..text.find("<robot").unwrap()].matches('\n').count();
+            assert_eq!(line(&mended), line(&text));
+        }
     }
 
     /// Many prefixes cost no time: none is declared, and the text stays what it was.

@@ -15,6 +15,7 @@ fn read(name: &str) -> Result<String, String> {
     match name {
         "child.xml" => Ok(CHILD.to_owned()),
         "rows.xml" => Ok(rows("")),
+        "arm.urdf" => Ok(ARM.to_owned()),
         other => Err(format!("{other} is not there")),
     }
 }
@@ -36,6 +37,17 @@ const CHILD: &str = r#"<?xml version="1.0"?>
   </worldbody>
   <actuator><motor name="shoulder" joint="shoulder"/><motor name="turn" joint="turn"/></actuator>
 </mujoco>"#;
+
+/// A URDF with two joints.
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"><inertial><mass value="1.5"/><origin xyz="0 0 .1" rpy=".3 .2 .1"/><inertia ixx=".03" iyy=".02" izz=".04" ixy=".001" ixz=".002" iyz=".003"/></inertial></link>
+  <link name="lower"><inertial><mass value="2"/><origin xyz="0 .1 .2" rpy=".1 .2 .3"/><inertia ixx=".05" iyy=".02" izz=".04" ixy=".001" ixz=".002" iyz=".003"/></inertial></link>
+  <link name="slider"><inertial><mass value="0.7"/><inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="elbow" type="revolute"><parent link="base"/><child link="lower"/><origin xyz="1 0 0" rpy=".1 .2 .3"/>
+    <axis xyz="0 2 1"/><limit lower="-1" upper="1" effort="5" velocity="3"/><dynamics damping="0.3"/></joint>
+  <joint name="slide" type="prismatic"><parent link="lower"/><child link="slider"/><origin xyz="0 0 .4" rpy="0 .5 0"/>
+    <axis xyz="1 0 0"/><limit lower="-.1" upper="1" effort="50" velocity="3"/></joint>
+</robot>"#;
 
 /// Rows of pendulums: copies inside of copies, with a class.
 fn rows(extra: &str) -> String {
@@ -120,7 +132,7 @@ fn check_forces(text: &str, expected: &[(&str, f64)]) {
 fn main_file(attach: &str) -> String {
     format!(
         r#"<mujoco model="main">
-  <asset><model name="ch" file="child.xml"/><model file="rows.xml"/></asset>
+  <asset><model name="ch" file="child.xml"/><model file="rows.xml"/><model file="arm.urdf"/></asset>
   <worldbody>
     <body name="root" pos="0 0 2"><joint name="yaw" axis="1 0 1"/><geom size=".2"/>
       <frame pos="0 0 .3" euler="90 0 0">{attach}</frame>
@@ -212,6 +224,64 @@ fn the_world_and_parts_of_the_same_model_are_attached() {
     assert!(fault.contains("needs `body` or `frame`"), "{fault}");
 }
 
+/// `MuJoCo` 4.0.0 reads a URDF as a part of an MJCF: the effort is a limit, and the joints have only the drives of the MJCF.
+#[test]
+fn a_urdf_is_attached_as_mujoco_does() {
+    let with_drives = |text: String| {
+        text.replace(
+            "</actuator>",
+            "<motor joint=\"x_elbow\"/><motor joint=\"x_slide\"/></actuator>",
+        )
+    };
+    let attach = r#"<attach model="arm" prefix="x_"/>"#;
+    let text = with_drives(main_file(attach));
+    check_forces(
+        &text,
+        &[
+            ("yaw", -2.494_222_681_674_303_4),
+            ("x_elbow", 2.983_219_893_515_047_3),
+            ("x_slide", 3.510_541_789_289_782),
+        ],
+    );
+    let imported = import(&expand_other_files(&text, &read).unwrap(), &ImportOptions::default()).unwrap();
+    for limits in ["[-1.0, 1.0]", "[-5.0, 5.0]", "[-50.0, 50.0]"] {
+        assert!(imported.model.contains(limits), "{limits} in {}", imported.model);
+    }
+    let remarks = crate::lines(&imported.remarks);
+    let says = "in `arm.urdf`: line 5: the limit of the rate of `elbow` is left out";
+    assert!(remarks.contains(says), "{remarks}");
+    // A coupling, and what `MuJoCo` computes from shapes.
+    let changed = |from: &str, to: &str| {
+        let arm = ARM.replace(from, to);
+        assert_ne!(arm, ARM);
+        expand_other_files(&main_file(attach), &|name| {
+            if name == "arm.urdf" {
+                Ok(arm.clone())
+            } else {
+                read(name)
+            }
+        })
+    };
+    let mimic = changed(
+        "<limit lower=\"-.1\"",
+        "<mimic joint=\"elbow\" multiplier=\"2\" offset=\".5\"/><limit lower=\"-.1\"",
+    );
+    let imported = import(&mimic.unwrap(), &ImportOptions::default()).unwrap();
+    let slide = imported.joints.iter().find(|joint| joint.name == "x_slide").unwrap();
+    assert!(
+        imported.model.contains("follows = \"2*x_elbow + 0.5\""),
+        "{slide:?} {}",
+        imported.model
+    );
+    let shapes = "<link name=\"tip\"><collision/></link><joint name=\"f\" type=\"fixed\"><parent link=\"base\"/>\
+                  <child link=\"tip\"/></joint></robot>";
+    let fault = changed("</robot>", shapes).unwrap_err();
+    assert!(
+        fault.starts_with("line 5, <attach>: in `arm.urdf`: line 9, <link> `tip`: MuJoCo computes the mass"),
+        "{fault}"
+    );
+}
+
 /// What refers to copied elements is copied as `MuJoCo` 4.0.0 does it: names and references of the file that it saves.
 #[test]
 fn what_refers_to_copies_is_copied() {
@@ -293,9 +363,9 @@ fn what_cannot_be_copied_is_refused_with_its_place() {
             "line 3, <replicate>: expected a number of copies in `count`",
         ),
         (
-            "<replicate count=\"2\"><joint/></replicate>".to_owned(),
+            "<replicate count=\"2\"><frame><joint/></frame></replicate>".to_owned(),
             "",
-            "line 3, <replicate>: <joint> cannot be a direct child of it",
+            "line 3, <joint>: <joint> cannot be copied alone",
         ),
         (
             format!("<replicate count=\"100000000\">{body}</replicate>"),
