@@ -70,11 +70,16 @@ class MujocoPeer:
         return limits.mujoco_faults(self.judge, self.mj, model, self.map.pairs)
 
 
-def load_mujoco(path):
-    """MuJoCo's model of a file."""
+def load_mujoco(path, has_springdampers=True):
+    """MuJoCo's model of a file, with or without the springs and dampers that it computes for `springdamper`."""
     import mujoco
 
     try:
+        if not has_springdampers:
+            spec = mujoco.MjSpec.from_file(str(path))
+            for joint in spec.joints:
+                joint.springdamper = [0, 0]
+            return spec.compile()
         return mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, mujoco.FatalError) as fault:
         raise NotRead(str(fault).splitlines()[0]) from fault

@@ -13,6 +13,7 @@ mod couplings;
 mod description;
 mod geoms;
 mod locks;
+mod mesh_polygons;
 mod meshes;
 mod mjcf;
 mod mjcf_actuators;
