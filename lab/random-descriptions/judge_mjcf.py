@@ -156,7 +156,7 @@ def actuator_limits(mj, a):
     """The force limits of an actuator before its gear; none if it has no limits."""
     force = mj.actuator_forcerange[a].tolist() if mj.actuator_forcelimited[a] else None
     # The force is a multiple of the control, which filters keep within its range.
-    known = (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
+    known = [int(one) for one in (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)]
     is_multiple = (mj.actuator_gaintype[a] == mujoco.mjtGain.mjGAIN_FIXED and mj.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_NONE
                    and mj.actuator_dyntype[a] in known)
     control = scaled(mj.actuator_ctrlrange[a].tolist(), mj.actuator_gainprm[a, 0])
