@@ -112,6 +112,8 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write as _;
+
     use super::super::meshes::{MeshInertia, TriangleMesh};
 
     /// A prism of height 0.5 whose base is a star with `n` corners, all as polygons.
@@ -122,7 +124,7 @@ mod tests {
                 #[expect(clippy::cast_precision_loss, reason = "small numbers")]
                 let angle = 2.0 * std::f64::consts::PI * k as f64 / n as f64;
                 let r = if k % 2 == 0 { 1.0 } else { 0.4 };
-                text += &format!("v {:.5} {:.5} {z}\n", 3.0 + r * angle.cos(), 1.0 + r * angle.sin());
+                let _ = writeln!(text, "v {:.5} {:.5} {z}", 3.0 + r * angle.cos(), 1.0 + r * angle.sin());
             }
         }
         let line = |places: Vec<usize>| {
@@ -142,12 +144,12 @@ mod tests {
     #[test]
     fn polygons_are_divided_as_mujoco_does() {
         for (n, triangles, mass) in [
-            (6, 20, 0.5196165622315396),
-            (10, 32, 0.538086930247268),
-            (24, 73, 0.5979302726650327),
-            (98, 296, 1.0294873188802545),
-            (100, 300, 1.0243375999585074),
-            (102, 204, 0.4186142121625853),
+            (6, 20, 0.519_616_562_231_539_6),
+            (10, 32, 0.538_086_930_247_268),
+            (24, 73, 0.597_930_272_665_032_7),
+            (98, 296, 1.029_487_318_880_254_5),
+            (100, 300, 1.024_337_599_958_507_4),
+            (102, 204, 0.418_614_212_162_585_3),
         ] {
             let mesh = TriangleMesh::read("star.obj", star(n).as_bytes()).unwrap();
             assert_eq!(mesh.triangles.len(), triangles, "{n}");

@@ -252,7 +252,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
                 .attributes
                 .extend(childclass.map(|class| ("childclass".to_owned(), class.to_owned())));
             for (key, values) in [("pos", place.into()), ("euler", turned)] {
-                if values != [0.0; 3] {
+                if values.iter().any(|x| *x != 0.0) {
                     let [x, y, z] = values;
                     frame.attributes.push((key.to_owned(), format!("{x:?} {y:?} {z:?}")));
                 }
