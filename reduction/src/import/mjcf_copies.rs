@@ -28,6 +28,9 @@ use super::xml_budget::check_xml_budget;
 /// Kinds of elements in the tree of bodies to which tendons, equalities and actuators refer, and tendons.
 const COPIED_KINDS: [&str; 5] = ["body", "joint", "site", "geom", "tendon"];
 
+/// Most steps of searches for names, some seconds. By judgement: published models need less than a hundredth of them.
+const MOST_STEPS: usize = 5_000_000;
+
 /// The text with copies in place of `<replicate>` and of `<attach>` without a model. Copies stand on the line of the
 /// element that demands them, so that line numbers in messages are those of the file.
 ///
@@ -57,6 +60,7 @@ pub(super) fn expand_copies(text: &str) -> Result<String, String> {
         elements: vec![CopiedElement::new("worldbody")],
         n_bytes: 0,
         n_nodes: 0,
+        n_steps: 0,
         operations: Vec::new(),
         replaced: Vec::new(),
     };
@@ -126,6 +130,8 @@ struct CopiedTree<'s, 'a, 'i> {
     n_bytes: usize,
     /// Number of all elements and attributes.
     n_nodes: usize,
+    /// Number of steps of searches for names.
+    n_steps: usize,
     /// In the order in which names change.
     operations: Vec<CopyOperation<'a, 'i>>,
     /// Ranges of the text with the elements in their place.
@@ -177,6 +183,18 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         }
         self.elements.push(element);
         Ok(self.elements.len() - 1)
+    }
+
+    /// Counts steps of a search.
+    fn spend_steps(&mut self, node: &Node, n: usize) -> Result<(), String> {
+        self.n_steps += n;
+        if self.n_steps > MOST_STEPS {
+            return Err(located_message(
+                node,
+                "the description has too many copies and references to them",
+            ));
+        }
+        Ok(())
     }
 
     /// Adds an element of the text without those inside it.
@@ -290,6 +308,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
                 return Err(located_message(node, says));
             }
         };
+        self.spend_steps(node, self.elements.len())?;
         let found = if (tag, name) == ("body", "world") {
             Some(FoundPart {
                 element: WORLD,
@@ -450,6 +469,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         element: usize,
         operation: &mut CopyOperation,
     ) -> Result<Option<Vec<usize>>, String> {
+        self.spend_steps(node, 1)?;
         let is_tendon = node.parent().is_some_and(|section| section.has_tag_name("tendon"));
         let all = std::iter::once(element).chain(self.elements[element].inside.iter().copied());
         let mut references = Vec::new();

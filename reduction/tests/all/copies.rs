@@ -390,6 +390,10 @@ fn what_cannot_be_copied_is_refused_with_its_place() {
         format!("{open}{body}{}", "</replicate>".repeat(n))
     };
     assert!(fault(&deep(12), "").contains("too large"));
+    // Each of many elements is searched for each of many names.
+    let many = "<replicate count=\"1\"/>".repeat(3000);
+    let motors = format!("<actuator>{}</actuator>", "<motor joint=\"k\"/>".repeat(3000));
+    assert!(fault(&many, &motors).contains("too many copies and references"));
     // A part of the same model must not be named as a model.
     let text = main_file(r#"<attach model="own" body="root" prefix="x_"/>"#)
         .replace("<model file=\"rows.xml\"/>", "<model name=\"own\"/>");
