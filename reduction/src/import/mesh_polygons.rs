@@ -21,7 +21,7 @@ pub(super) fn divide_polygon(corners: &[Vector3<f64>], polygon: &[usize]) -> Vec
         // The shorter diagonal divides a quadrangle.
         [a, b, c, d] => {
             let squared = |from: usize, to: usize| -> f32 {
-                let [x, y, z] = difference(at(to), at(from));
+                let [x, y, z] = subtract(at(to), at(from));
                 x * x + y * y + z * z
             };
             if squared(a, c) < squared(b, d) {
@@ -32,18 +32,18 @@ pub(super) fn divide_polygon(corners: &[Vector3<f64>], polygon: &[usize]) -> Vec
         }
         _ if polygon.len() > MOST_CORNERS => Vec::new(),
         _ => {
-            let axes = plane_axes(&polygon.iter().map(|place| at(*place)).collect::<Vec<_>>());
+            let axes = find_plane_axes(&polygon.iter().map(|place| at(*place)).collect::<Vec<_>>());
             cut_ears(polygon, &|place| axes.map(|axis| at(place)[axis]))
         }
     }
 }
 
 /// The two axes of the plane in which a polygon is divided: those across which its first true corner is largest.
-fn plane_axes(polygon: &[[f32; 3]]) -> [usize; 2] {
+fn find_plane_axes(polygon: &[[f32; 3]]) -> [usize; 2] {
     let n = polygon.len();
     for k in 0..n {
         let [first, second, third] = [0, 1, 2].map(|step| polygon[(k + step) % n]);
-        let (a, b) = (difference(second, first), difference(third, second));
+        let (a, b) = (subtract(second, first), subtract(third, second));
         let x = (a[1] * b[2] - a[2] * b[1]).abs();
         let y = (a[2] * b[0] - a[0] * b[2]).abs();
         let z = (a[0] * b[1] - a[1] * b[0]).abs();
@@ -106,7 +106,7 @@ fn is_inside(triangle: &[PlanarPoint; 3], [x, y]: PlanarPoint) -> bool {
 }
 
 /// The vector from `b` to `a`.
-fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+fn subtract(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

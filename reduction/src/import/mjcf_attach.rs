@@ -136,7 +136,8 @@ impl AttachedModels<'_> {
     fn expand(&mut self, text: &str, folder: &str, level: NestingLevel) -> Result<String, String> {
         let read = self.read;
         let text = expand_includes(text, &|name| read(&joined_path(folder, name)))?;
-        expand_copies(&self.expand_models(text, folder, level)?)
+        let text = self.expand_models(text, folder, level)?;
+        Ok(expand_copies(&text)?.into_owned())
     }
 
     /// Expands the models that a text attaches.

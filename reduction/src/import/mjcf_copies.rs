@@ -9,6 +9,7 @@
 //! Decision: MuJoCo 4.0 drops an equality or an actuator that refers to one element inside a `<replicate>` and to one
 //! outside, without a message, or refuses it, depending on the order of the bodies. Here it is refused.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -35,18 +36,18 @@ const MOST_STEPS: usize = 5_000_000;
 /// element that demands them, so that line numbers in messages are those of the file.
 ///
 /// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
-pub(super) fn expand_copies(text: &str) -> Result<String, String> {
+pub(super) fn expand_copies(text: &str) -> Result<Cow<'_, str>, String> {
     if !(text.contains("<replicate") || text.contains("<attach")) || check_xml_budget(text).is_err() {
-        return Ok(text.to_owned());
+        return Ok(Cow::Borrowed(text));
     }
     let Ok(document) = Document::parse(text) else {
-        return Ok(text.to_owned());
+        return Ok(Cow::Borrowed(text));
     };
     let root = document.root_element();
     let demands = |node: &Node| node.has_tag_name("replicate") || is_own_part(node);
     let n_demands = root.descendants().filter(demands).count();
     if !root.has_tag_name("mujoco") || n_demands == 0 {
-        return Ok(text.to_owned());
+        return Ok(Cow::Borrowed(text));
     }
     if n_demands > MOST_NAMED_ELEMENTS {
         return Err(format!(
@@ -69,7 +70,7 @@ pub(super) fn expand_copies(text: &str) -> Result<String, String> {
         tree.add_inside(&world, WORLD, (level, ReplicationState::Outside))?;
     }
     tree.copy_references(&root)?;
-    Ok(tree.written(text))
+    Ok(Cow::Owned(tree.into_text(text)))
 }
 
 /// Whether an element attaches a part of the same model.
@@ -255,7 +256,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         let offset = vector(three("offset").transpose()?.unwrap_or_default());
         let original = self.add(node, CopiedElement::new("frame"))?;
         self.add_inside(node, original, (level, ReplicationState::Inside))?;
-        let names = self.names_inside(original);
+        let names = self.collect_names(original);
         let width = count.to_string().len();
         let (mut copies, mut frames, mut place) = (Vec::new(), Vec::new(), Vector3::zeros());
         for k in 0..count {
@@ -324,7 +325,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
             return Err(located_message(node, &says));
         };
         let mut inner = level.enter();
-        for _ in 0..self.height(part.element) {
+        for _ in 0..self.count_levels(part.element) {
             inner = inner.and_then(NestingLevel::enter);
         }
         inner.map_err(|fault| located_message(node, &fault.to_string()))?;
@@ -338,7 +339,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         frame
             .attributes
             .extend(part.attached.map(|number| (ATTACHED.to_owned(), number)));
-        let names = self.names_inside(part.element);
+        let names = self.collect_names(part.element);
         let copy = self.copy(node, part.element, &name)?;
         frame.inside.push(copy);
         let frame = self.add(node, frame)?;
@@ -374,13 +375,13 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
     }
 
     /// Number of levels inside an element.
-    fn height(&self, element: usize) -> usize {
+    fn count_levels(&self, element: usize) -> usize {
         let inside = self.elements[element].inside.iter();
-        inside.map(|inner| 1 + self.height(*inner)).max().unwrap_or(0)
+        inside.map(|inner| 1 + self.count_levels(*inner)).max().unwrap_or(0)
     }
 
     /// Kinds and names of an element and of those inside it.
-    fn names_inside(&self, element: usize) -> BTreeSet<(String, String)> {
+    fn collect_names(&self, element: usize) -> BTreeSet<(String, String)> {
         let mut out = BTreeSet::new();
         let mut waiting = vec![element];
         while let Some(index) = waiting.pop() {
@@ -496,9 +497,9 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
             return Ok(Some(out));
         }
         for name in &operation.copies {
-            let copied = self.renamed(node, element, operation, name)?;
+            let copied = self.copy_renamed(node, element, operation, name)?;
             for inner in self.elements[element].inside.clone() {
-                let index = self.renamed(node, inner, operation, name)?;
+                let index = self.copy_renamed(node, inner, operation, name)?;
                 self.elements[copied].inside.push(index);
             }
             out.push(copied);
@@ -511,7 +512,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
     }
 
     /// A copy of an element, without those inside it, with the names of copied elements.
-    fn renamed(
+    fn copy_renamed(
         &mut self,
         node: &Node,
         from: usize,
@@ -531,7 +532,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
     }
 
     /// The text with all copies, on the same number of lines.
-    fn written(mut self, text: &str) -> String {
+    fn into_text(mut self, text: &str) -> String {
         self.replaced.sort_by_key(|(range, _)| range.start);
         let mut out = String::new();
         let mut from = 0;

@@ -46,6 +46,7 @@ pub use mjcf_include::FileReader;
 pub use mjcf_meshes::MeshFiles;
 pub use thresholds::{LARGEST_DESCRIPTION, LARGEST_MESH};
 
+use std::borrow::Cow;
 use std::fmt;
 
 use description::RobotDescription;
@@ -180,8 +181,10 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
     })?;
     let readable = xml_repair::readable_xml(text);
     let copied = mjcf_copies::expand_copies(&readable).map_err(ImportError)?;
-    xml_budget::check_xml_budget(&copied).map_err(ImportError)?;
-    let text = copied.as_str();
+    if let Cow::Owned(changed) = &copied {
+        xml_budget::check_xml_budget(changed).map_err(ImportError)?;
+    }
+    let text = copied.as_ref();
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {
