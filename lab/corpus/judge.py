@@ -140,8 +140,9 @@ def mujoco_faults(model, said, path):
     """Faults against MuJoCo with what the remarks name left out, its names, faults of limits, and the number of forces."""
     peer = peers.MujocoPeer(peers.load_mujoco(path), model, said)
     found, compared = faults(model, peer)
-    mj = peers.load_mujoco(path)
-    short = named.leave_out(mj, said) if found else []
+    has_springdampers = "`springdamper` of <joint>" not in said
+    mj = peers.load_mujoco(path, has_springdampers)
+    short = named.leave_out(mj, said) + ["spring-dampers"] * (not has_springdampers) if found else []
     found = faults(model, peers.MujocoPeer(mj, model, said))[0] if short else found
     return found, short, peer.limit_faults(model), compared
 

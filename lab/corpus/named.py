@@ -46,6 +46,17 @@ def _without_tendon_forces(mj):
         values[:] = 0
 
 
+def _without_mocap_equalities(mj):
+    """Disables equalities with a mocap body."""
+    site, body = (int(mujoco.mjtObj.mjOBJ_SITE), int(mujoco.mjtObj.mjOBJ_BODY))
+    for e in range(mj.neq):
+        ends = (mj.eq_obj1id[e], mj.eq_obj2id[e])
+        if mj.eq_objtype[e] in (site, body):
+            bodies = [mj.site_bodyid[end] if mj.eq_objtype[e] == site else end for end in ends]
+            if any(mj.body_mocapid[one] >= 0 for one in bodies):
+                mj.eq_active0[e] = 0
+
+
 def _with_first_numbers(mj):
     """Removes the further numbers of polynomial springs and dampers."""
     for name in ("jnt_stiffnesspoly", "dof_dampingpoly", "tendon_stiffnesspoly", "tendon_dampingpoly", "actuator_dampingpoly"):
@@ -61,6 +72,7 @@ NAMED = (
     ("of the ball joint", "losses of ball joints", _without_ball_losses),
     ("of the free joint", "losses of free joints", _without_free_losses),
     ("of this tendon: left out", "forces of tendons", _without_tendon_forces),
+    ("which is moved from outside; this equality is left out", "equalities with mocap bodies", _without_mocap_equalities),
     ("only the first number of", "polynomial springs and dampers", _with_first_numbers),
 )
 

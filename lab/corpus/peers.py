@@ -20,6 +20,17 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "random-descriptions"))
 MASSLESS = "1e-15"
 
 
+def root_of(path):
+    """The root of an XML file. Prefixes that the file does not declare are declared, since other readers accept them."""
+    text = Path(path).read_bytes().decode(errors="replace")
+    try:
+        return ElementTree.fromstring(text.encode())
+    except ElementTree.ParseError:
+        prefixes = sorted(set(re.findall(r"[<\s]([\w-]+):[\w-]+(?=[\s=>/])", text)) - set(re.findall(r"xmlns:([\w-]+)", text)))
+        declared = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in prefixes)
+        return ElementTree.fromstring(re.sub(r"<robot\b", f"<robot{declared}", text, count=1).encode())
+
+
 class NotRead(Exception):
     """The other program does not read the description."""
 
@@ -70,11 +81,16 @@ class MujocoPeer:
         return limits.mujoco_faults(self.judge, self.mj, model, self.map.pairs)
 
 
-def load_mujoco(path):
-    """MuJoCo's model of a file."""
+def load_mujoco(path, has_springdampers=True):
+    """MuJoCo's model of a file, with or without the springs and dampers that it computes for `springdamper`."""
     import mujoco
 
     try:
+        if not has_springdampers:
+            spec = mujoco.MjSpec.from_file(str(path))
+            for joint in spec.joints:
+                joint.springdamper = [0, 0]
+            return spec.compile()
         return mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, mujoco.FatalError) as fault:
         raise NotRead(str(fault).splitlines()[0]) from fault
@@ -161,7 +177,7 @@ def load_pinocchio(path, is_floating):
 
 def moving_joints(path):
     """Names of the joints of a URDF that move, breadth first from the root, as the import has them."""
-    joints = [joint for joint in ElementTree.parse(path).getroot().findall("joint")]
+    joints = [joint for joint in root_of(path).findall("joint")]
     below, children = {}, set()
     for joint in joints:
         below.setdefault(joint.find("parent").get("link"), []).append(joint)
@@ -178,7 +194,7 @@ def moving_joints(path):
 
 def mimic_joints(path):
     """Names of the joints of a URDF that follow others that move."""
-    joints = ElementTree.parse(path).getroot().findall("joint")
+    joints = root_of(path).findall("joint")
     moving = {joint.get("name") for joint in joints if joint.get("type") != "fixed"}
     follows = {joint.get("name"): joint.find("mimic").get("joint") for joint in joints if joint.find("mimic") is not None}
     return [name for name, leader in follows.items() if name in moving and leader in moving]
@@ -186,7 +202,7 @@ def mimic_joints(path):
 
 def stated_limits(path):
     """Limits of the joints of a URDF by name; of coupled joints the range only."""
-    root = ElementTree.parse(path).getroot()
+    root = root_of(path)
     coupled = {joint.get("joint") for joint in root.iter("mimic")} | set(mimic_joints(path))
     out = {}
     for joint in root.findall("joint"):
@@ -345,7 +361,7 @@ def body_named(plant, frame):
 
 def root_link(path):
     """The link of a URDF that is no child; none if it is the world, which needs no element."""
-    root = ElementTree.parse(path).getroot()
+    root = root_of(path)
     children = {joint.find("child").get("link") for joint in root.findall("joint")}
     return next((link.get("name") for link in root.findall("link") if link.get("name") not in children), None)
 
@@ -353,7 +369,7 @@ def root_link(path):
 def stated_mimics(path):
     """Couplings of joints as the file states them: the leader, ratio and offset by the follower's name."""
     out = {}
-    for joint in ElementTree.parse(path).getroot().iter("joint"):
+    for joint in root_of(path).iter("joint"):
         own, inner = joint.find("mimic"), joint.find("axis/mimic")
         if own is not None:
             out[joint.get("name")] = own.get("joint"), float(own.get("multiplier", 1)), float(own.get("offset", 0))
@@ -367,7 +383,7 @@ def stated_mimics(path):
 def stated_friction(path):
     """Coulomb friction of the joints of a file, which Drake does not read."""
     out = {}
-    for joint in ElementTree.parse(path).getroot().iter("joint"):
+    for joint in root_of(path).iter("joint"):
         own, inner = joint.find("dynamics"), joint.findtext("axis/dynamics/friction")
         if joint.get("type") in ("revolute", "prismatic", "continuous"):
             out[joint.get("name")] = float(inner or (own.get("friction", 0) if own is not None else 0))

@@ -155,10 +155,12 @@ def clamped(first, then):
 def actuator_limits(mj, a):
     """The force limits of an actuator before its gear; none if it has no limits."""
     force = mj.actuator_forcerange[a].tolist() if mj.actuator_forcelimited[a] else None
-    # The control of a motor is its force.
-    is_motor = (mj.actuator_gaintype[a] == mujoco.mjtGain.mjGAIN_FIXED and mj.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_NONE
-                and mj.actuator_dyntype[a] == mujoco.mjtDyn.mjDYN_NONE and mj.actuator_gainprm[a, 0] == 1)
-    return clamped(mj.actuator_ctrlrange[a].tolist(), force) if is_motor and mj.actuator_ctrllimited[a] else force
+    # The force is a multiple of the control, which filters keep within its range.
+    known = [int(one) for one in (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)]
+    is_multiple = (mj.actuator_gaintype[a] == mujoco.mjtGain.mjGAIN_FIXED and mj.actuator_biastype[a] == mujoco.mjtBias.mjBIAS_NONE
+                   and mj.actuator_dyntype[a] in known)
+    control = scaled(mj.actuator_ctrlrange[a].tolist(), mj.actuator_gainprm[a, 0])
+    return clamped(control, force) if is_multiple and mj.actuator_ctrllimited[a] else force
 
 
 def scaled(limits, gear):

@@ -834,6 +834,79 @@ def body_simple(t):
     t.bodies[0].set("sleep", "never")
 
 
+def replicate(t, around, count, **more):
+    """Moves the last body into a `<replicate>`."""
+    copied = ET.SubElement(around, "replicate", count=str(count), offset=t.vec(), euler=t.vec(), **more)
+    parent = {child: one for one in t.root.iter() for child in one}
+    moved = t.bodies[-1]
+    parent[moved].remove(moved)
+    copied.append(moved)
+    return copied
+
+
+@feature()
+def replicated_world(t):
+    replicate(t, t.world, t.rng.randint(1, 3))
+
+
+@feature()
+def replicated_in_body(t):
+    body = ET.SubElement(t.world, "body", name="stand", pos=t.vec()); orient(t, body); t.inertial(body)
+    ET.SubElement(body, "joint", name="jstand", axis=t.vec())
+    frame = ET.SubElement(body, "frame", pos=t.vec()); orient(t, frame)
+    replicate(t, frame, 2, sep="_")
+
+
+@feature()
+def replicated_in_degrees(t):
+    t.compiler.set("angle", "degree"); t.compiler.set("eulerseq", t.rng.choice(["zyx", "XYZ", "yzy"]))
+    copied = replicate(t, t.world, 3); copied.set("euler", t.vec(3, 80))
+
+
+@feature()
+def replicated_twice(t):
+    inner = replicate(t, t.world, 2, sep="a")
+    t.world.remove(inner)
+    ET.SubElement(t.world, "replicate", count="2", offset=t.vec(), euler=t.vec(), sep="b").append(inner)
+
+
+@feature()
+def replicated_coupling(t):
+    b = ET.SubElement(t.bodies[-1], "body", name="tip", pos=t.vec()); t.inertial(b)
+    ET.SubElement(b, "joint", name="jtip", type=t.joints[-1].get("type"), axis=t.vec())
+    e = t.section("equality"); ET.SubElement(e, "joint", joint1="jtip", joint2=t.joints[-1].get("name"), polycoef="0.1 2 0 0 0")
+    replicate(t, t.world, 2)
+
+
+@feature()
+def replicated_motor(t):
+    a = t.section("actuator")
+    ET.SubElement(a, "motor", name="m", joint=t.joints[-1].get("name"), gear="3", ctrlrange="-2 2", armature="0.2")
+    replicate(t, t.world, 2)
+
+
+@feature()
+def replicated_shapes(t):
+    b = t.body(); b.remove(b.find("inertial"))
+    copied = ET.SubElement(b, "replicate", count="3", offset=t.vec(), euler=t.vec())
+    ET.SubElement(copied, "geom", name="shape", type="box", size="0.1 0.2 0.3", pos=t.vec())
+
+
+@feature()
+def own_part_attached(t):
+    ET.SubElement(t.section("default"), "joint", damping="0.3")
+    frame = ET.SubElement(t.world, "frame", pos=t.vec()); orient(t, frame)
+    ET.SubElement(frame, "attach", body=t.body().get("name"), prefix="x_")
+
+
+@feature()
+def own_part_with_motor_attached(t):
+    ET.SubElement(t.section("actuator"), "motor", name="m", joint=t.joints[-1].get("name"), gear="3", armature="0.2")
+    body = ET.SubElement(t.world, "body", name="stand", pos=t.vec()); orient(t, body); t.inertial(body)
+    ET.SubElement(body, "joint", name="jstand", axis=t.vec())
+    ET.SubElement(body, "attach", body=t.bodies[-1].get("name"), prefix="x_")
+
+
 def describe(seed, name):
     tree = Tree(seed)
     function, words = FEATURES[name]

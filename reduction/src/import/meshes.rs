@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::description::DescriptionInertia;
+use super::mesh_polygons::divide_polygon;
 use super::placed::DescriptionPose;
 
 /// Length of the header of a binary STL, bytes.
@@ -118,7 +119,7 @@ impl TriangleMesh {
         mesh.checked()
     }
 
-    /// Reads the corners and faces of an OBJ; a face of more than three corners is divided from its first one.
+    /// Reads the corners and faces of an OBJ. Corners have 32 bits, as in MuJoCo.
     fn read_obj(text: &str) -> Result<Self, String> {
         let mut mesh = Self::default();
         for (i, line) in text.lines().enumerate() {
@@ -130,7 +131,9 @@ impl TriangleMesh {
                     let [x, y, z] = numbers[..] else {
                         return Err(fault("expected three numbers after `v`"));
                     };
-                    mesh.corners.push(Vector3::new(x, y, z));
+                    #[expect(clippy::cast_possible_truncation, reason = "MuJoCo keeps 32 bits")]
+                    let short = [x, y, z].map(|x| f64::from(x as f32));
+                    mesh.corners.push(Vector3::from(short));
                 }
                 Some("f") => {
                     let n = mesh.corners.len();
@@ -148,8 +151,7 @@ impl TriangleMesh {
                     let Some(corners) = corners.filter(|corners| corners.len() >= 3) else {
                         return Err(fault("expected at least three corners that exist after `f`"));
                     };
-                    let others = corners[1..].windows(2);
-                    mesh.triangles.extend(others.map(|pair| [corners[0], pair[0], pair[1]]));
+                    mesh.triangles.extend(divide_polygon(&mesh.corners, &corners));
                 }
                 _ => {}
             }

@@ -14,6 +14,8 @@ use super::geoms::{self, GIVE_INERTIAL};
 use super::mjcf_compiler::{CompilerSettings, MjcfCompiler};
 use super::mjcf_defaults::MjcfDefaults;
 use super::mjcf_meshes::{LoadedMeshes, MeshFiles};
+use super::mjcf_names::GivenNames;
+use super::mjcf_of_urdf::ATTACHED_REMARK;
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
 use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
@@ -29,6 +31,8 @@ pub(super) struct MjcfReader<'a> {
     pub(super) world: Vec<DescriptionPose>,
     /// The bodies by their names, for elements that refer to them.
     pub(super) link_of_name: BTreeMap<String, usize>,
+    /// Names of the file, and of elements that it does not name.
+    names: GivenNames,
     /// Bodies that are moved from outside.
     pub(super) mocap_links: Vec<usize>,
     /// Sites: name, link (none is the world) and pose in it.
@@ -62,6 +66,7 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
         },
         world: Vec::new(),
         link_of_name: BTreeMap::new(),
+        names: GivenNames::read(&root)?,
         mocap_links: Vec::new(),
         sites: Vec::new(),
         mesh_files,
@@ -96,13 +101,16 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
                 "other files can only be read if the description is given as a file",
             ));
         }
-        if ["replicate", "composite", "flexcomp"].contains(&tag) {
+        if ["composite", "flexcomp"].contains(&tag) {
             return Err(located_message(
                 &node,
                 "this element is not expanded here; save the complete model with MuJoCo (mj_saveLastXML) and import that file",
             ));
         }
     }
+    // Remarks on attached files of another format.
+    let remarks = children(&root, ATTACHED_REMARK).filter_map(|node| node.attribute("text"));
+    reader.out.remarks.extend(remarks.map(str::to_owned));
     // The tree of bodies with their joints and inertias.
     for body in children(&root, "worldbody") {
         let inside = MjcfContext {
@@ -199,22 +207,7 @@ impl<'a> MjcfReader<'a> {
             out.r = rotation_about(&axis, angle);
         }
         if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
-            out.r = Matrix3::identity();
-            // One rotation after the other, in the sequence of the file.
-            for (letter, angle) in settings.euler.chars().zip(angles) {
-                let axis = match letter.to_ascii_lowercase() {
-                    'x' => Vector3::x(),
-                    'y' => Vector3::y(),
-                    _ => Vector3::z(),
-                };
-                let turn = rotation_about(&axis, settings.angle(angle));
-                out.r = if letter.is_ascii_lowercase() {
-                    out.r * turn
-                } else {
-                    // Rotations about fixed axes multiply from the left.
-                    turn * out.r
-                };
-            }
+            out.r = settings.euler_rotation(angles);
         }
         Ok(out)
     }
@@ -270,15 +263,8 @@ impl<'a> MjcfReader<'a> {
         let placed = place.compose(&self.read_placement(node, None)?);
         let own = self.out.links.len();
         // Bodies without a name are numbered.
-        let name = node
-            .attribute("name")
-            .map_or_else(|| format!("body{}", own + 1), str::to_owned);
-        if self.link_of_name.insert(name.clone(), own).is_some() {
-            return Err(located_message(
-                node,
-                &format!("two bodies have the name `{name}`; rename one"),
-            ));
-        }
+        let name = self.names.name_of(node, "body", &format!("body{}", own + 1));
+        self.link_of_name.insert(name.clone(), own);
         let parent = around.link.map_or(DescriptionPose::identity(), |link| self.world[link]);
         // Equalities between bodies need the poses in the world.
         self.world.push(parent.compose(&placed));
@@ -499,14 +485,14 @@ impl<'a> MjcfReader<'a> {
     }
 
     /// A free joint, which only a body of the world may have.
-    fn free_joint(&self, node: &Node, link: usize) -> Result<DescriptionJoint, String> {
-        let name = node.attribute("name").unwrap_or("root").to_owned();
+    fn free_joint(&mut self, node: &Node, link: usize) -> Result<DescriptionJoint, String> {
         if self.out.links[link].parent.is_some() {
             return Err(located_message(
                 node,
                 "a free joint is possible for a child of the world only",
             ));
         }
+        let name = self.names.name_of(node, "joint", "root");
         Ok(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)))
     }
 
@@ -543,13 +529,9 @@ impl<'a> MjcfReader<'a> {
         };
         let n = self.out.links[link].joints.len();
         // Joints without a name are named after their body, with a number from the second on.
-        let name = node.attribute("name").map_or_else(
-            || {
-                let suffix = if n == 0 { String::new() } else { format!("{}", n + 1) };
-                format!("{}_joint{suffix}", self.out.links[link].name)
-            },
-            str::to_owned,
-        );
+        let suffix = if n == 0 { String::new() } else { format!("{}", n + 1) };
+        let wanted = format!("{}_joint{suffix}", self.out.links[link].name);
+        let name = self.names.name_of(node, "joint", &wanted);
         let mut joint = DescriptionJoint::new(name, kind, line(node));
         joint.is_driven = false;
         if let Some(pos) = self.numbers(node, class, "pos")? {

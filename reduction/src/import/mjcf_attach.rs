@@ -13,12 +13,15 @@ use std::fmt::Write as _;
 use modelmill_boundary::nesting::NestingLevel;
 use roxmltree::{Document, Node};
 
+use super::mjcf_copies::expand_copies;
 use super::mjcf_defaults::MAIN_CLASS;
 use super::mjcf_include::{FILE_FOLDER, FileReader, expand_includes, folder_of, joined_path};
 use super::mjcf_meshes::name_of_file;
+use super::mjcf_of_urdf::mjcf_of_urdf;
 use super::thresholds::LARGEST_DESCRIPTION;
-use super::xml::{children, located_message, required_attribute, write_escaped};
+use super::xml::{children, located_message, write_escaped};
 use super::xml_budget::check_xml_budget;
+use super::xml_repair::readable_xml;
 
 /// Attribute of elements of attached models: the number of the attached model.
 pub(super) const ATTACHED: &str = "modelmill-attached";
@@ -43,9 +46,9 @@ const LEFT_BEHIND: [&str; 10] = [
     "worldbody",
 ];
 /// Sections whose elements may refer to something that is not attached. Those to which others refer come first.
-const WITH_REFERENCES: [&str; 3] = ["tendon", "equality", "actuator"];
+pub(super) const WITH_REFERENCES: [&str; 3] = ["tendon", "equality", "actuator"];
 /// Attributes that refer to an element by its name, with the kind of this element.
-const REFERENCES: [(&str, &str); 25] = [
+pub(super) const REFERENCES: [(&str, &str); 25] = [
     ("actuator", "actuator"),
     ("body", "body"),
     ("body1", "body"),
@@ -121,6 +124,8 @@ struct AttachedModel<'a, 'i> {
     root: Node<'a, 'i>,
     /// The body or frame that is attached; none attaches all of the world.
     part: Option<Node<'a, 'i>>,
+    /// Name of the body that all of the world becomes; none if its elements are attached without a body.
+    world_body: Option<String>,
     /// Bodies, joints, sites and the like that are not attached: kind and name.
     missing: BTreeSet<(&'a str, &'a str)>,
 }
@@ -131,6 +136,12 @@ impl AttachedModels<'_> {
     fn expand(&mut self, text: &str, folder: &str, level: NestingLevel) -> Result<String, String> {
         let read = self.read;
         let text = expand_includes(text, &|name| read(&joined_path(folder, name)))?;
+        let text = self.expand_models(text, folder, level)?;
+        Ok(expand_copies(&text)?.into_owned())
+    }
+
+    /// Expands the models that a text attaches.
+    fn expand_models(&mut self, text: String, folder: &str, level: NestingLevel) -> Result<String, String> {
         // Faults of the text are reported by the import.
         if !text.contains("<attach") || check_xml_budget(&text).is_err() {
             return Ok(text);
@@ -149,10 +160,9 @@ impl AttachedModels<'_> {
         let (mut elements, mut sections) = (Vec::new(), String::new());
         let mut size = text.len();
         for node in root.descendants().filter(|node| node.has_tag_name("attach")) {
+            // Parts of the same model are copied afterwards.
             let Some(name) = node.attribute("model") else {
-                let says = "it needs the attribute `model`; parts of the same model are not attached here: save the complete \
-                            model with MuJoCo (mj_saveLastXML)";
-                return Err(located_message(&node, says));
+                continue;
             };
             let Some(path) = paths.get(name) else {
                 let says = format!("there is no <model> with the name `{name}` in <asset>");
@@ -183,6 +193,7 @@ impl AttachedModels<'_> {
         for (range, element) in elements {
             out.push_str(&text[from..range.start]);
             out.push_str(&element);
+            out.extend(text[range.clone()].matches('\n'));
             from = range.end;
         }
         let end = text[..root.range().end].rfind("</").unwrap_or(from).max(from);
@@ -207,6 +218,12 @@ impl AttachedModels<'_> {
         self.unfinished.push(path.to_owned());
         let whole = self.expand(&text, folder_of(path), inside).map_err(in_file)?;
         self.unfinished.pop();
+        let whole = match Document::parse(&whole) {
+            Ok(document) if document.root_element().has_tag_name("robot") => {
+                mjcf_of_urdf(&document, path).map_err(in_file)?
+            }
+            _ => whole,
+        };
         check_xml_budget(&whole).map_err(in_file)?;
         self.expanded.insert(path.to_owned(), whole.clone());
         Ok(whole)
@@ -218,9 +235,13 @@ impl AttachedModels<'_> {
         let mut out = BTreeMap::new();
         let entries = children(root, "asset").flat_map(|asset| children(&asset, "model").collect::<Vec<_>>());
         for entry in entries {
-            let file = required_attribute(&entry, "file")?;
+            let Some(file) = entry.attribute("file") else {
+                let says =
+                    "it needs the attribute `file`; to attach a part of this model, leave `model` of <attach> out";
+                return Err(located_message(&entry, says));
+            };
             let of_include = entry.attribute(FILE_FOLDER).unwrap_or_default();
-            let path = joined_path(folder, &joined_path(of_include, &file));
+            let path = joined_path(folder, &joined_path(of_include, file));
             let name = match entry.attribute("name") {
                 Some(name) => name.to_owned(),
                 None => {
@@ -229,9 +250,14 @@ impl AttachedModels<'_> {
                     if self.n_parsed > MOST_PARSED {
                         return Err(located_message(&entry, "the attached models are too large together"));
                     }
-                    let parsed = check_xml_budget(&text).ok().and_then(|()| Document::parse(&text).ok());
-                    let name =
-                        parsed.and_then(|document| document.root_element().attribute("model").map(str::to_owned));
+                    let readable = check_xml_budget(&text).ok().map(|()| readable_xml(&text));
+                    let parsed = readable.as_deref().and_then(|text| Document::parse(text).ok());
+                    // A URDF has its name in another attribute.
+                    let name = parsed.and_then(|document| {
+                        let root = document.root_element();
+                        let key = if root.has_tag_name("robot") { "name" } else { "model" };
+                        root.attribute(key).map(str::to_owned)
+                    });
                     name.unwrap_or_else(|| UNNAMED_MODEL.to_owned())
                 }
             };
@@ -254,14 +280,18 @@ impl AttachedModels<'_> {
         let root = inner.root_element();
         if root.tag_name().name() != "mujoco" {
             let says = format!(
-                "`{path}` is no MJCF; other formats are not attached here: save the complete model with MuJoCo (mj_saveLastXML)"
+                "`{path}` is neither MJCF nor URDF; other formats are not attached: save the complete model with MuJoCo (mj_saveLastXML)"
             );
             return Err(located_message(node, &says));
         }
         // A body or a frame can be attached alone.
-        let mut part = None;
+        let (mut part, mut world_body) = (None, None);
         for tag in ["body", "frame"] {
             if let Some(name) = node.attribute(tag) {
+                if (tag, name) == ("body", "world") {
+                    world_body = Some(format!("{prefix}world"));
+                    continue;
+                }
                 let is_it = |other: &Node| other.has_tag_name(tag) && other.attribute("name") == Some(name);
                 let found = root.descendants().find(is_it);
                 let fault = || located_message(node, &format!("`{path}` has no {tag} `{name}`"));
@@ -283,6 +313,7 @@ impl AttachedModels<'_> {
             folder: folder_of(path),
             root,
             part,
+            world_body,
             missing: BTreeSet::new(),
         };
         out.find_missing();
@@ -303,7 +334,7 @@ impl<'a> AttachedModel<'a, '_> {
             return;
         };
         let names = |node: Node<'a, '_>| -> BTreeSet<(&'a str, &'a str)> {
-            let named = |inner: Node<'a, '_>| Some((named_kind(&inner), inner.attribute("name")?));
+            let named = |inner: Node<'a, '_>| Some((named_kind(inner.tag_name().name()), inner.attribute("name")?));
             node.descendants().filter_map(named).collect()
         };
         let world = children(&self.root, "worldbody").flat_map(names);
@@ -348,10 +379,16 @@ impl<'a> AttachedModel<'a, '_> {
         match self.part {
             Some(part) => self.write(&mut out, &part, None),
             None => {
+                if let Some(name) = &self.world_body {
+                    out.push_str("<body");
+                    write_attribute(&mut out, "name", name);
+                    out.push('>');
+                }
                 let worlds = children(&self.root, "worldbody");
                 for node in worlds.flat_map(|world| world.children()).filter(Node::is_element) {
                     self.write(&mut out, &node, None);
                 }
+                out.push_str(if self.world_body.is_some() { "</body>" } else { "" });
             }
         }
         out.push_str("</frame>");
@@ -432,6 +469,8 @@ impl<'a> AttachedModel<'a, '_> {
             let (key, value) = (attribute.name(), attribute.value());
             let renamed = match key {
                 ATTACHED => self.nested_number(value),
+                // Meshes of files that the attached file includes.
+                FILE_FOLDER if tag == "mesh" && attached_number(node).is_none() => joined_path(self.folder, value),
                 _ if CLASSES.contains(&key) => self.class(value),
                 // The world has no other name.
                 _ if referred_kind(key) == Some("body") && value == "world" => value.to_owned(),
@@ -487,9 +526,9 @@ fn referred_kind(key: &str) -> Option<&'static str> {
         .map(|(_, kind)| *kind)
 }
 
-/// The kind of a named element in the tree of bodies.
-fn named_kind<'a>(node: &Node<'a, '_>) -> &'a str {
-    match node.tag_name().name() {
+/// The kind of elements with a tag in the tree of bodies.
+pub(super) fn named_kind(tag: &str) -> &str {
+    match tag {
         "freejoint" => "joint",
         tag => tag,
     }
@@ -507,7 +546,7 @@ fn write_opening(out: &mut String, tag: &str, number: &str) {
 }
 
 /// Writes an attribute.
-fn write_attribute(out: &mut String, key: &str, value: &str) {
+pub(super) fn write_attribute(out: &mut String, key: &str, value: &str) {
     let _ = write!(out, " {key}=\"");
     write_escaped(out, value);
     out.push('"');

@@ -5,11 +5,12 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
 use super::mjcf_attach::{ATTACHED, attached_number};
 use super::mjcf_meshes::MeshFolder;
+use super::placed::rotation_about;
 use super::xml::{children, exact_numbers, located_message};
 
 /// Settings of `<compiler>`, with MuJoCo's defaults.
@@ -85,6 +86,26 @@ impl MjcfCompiler {
     /// An angle of the file in rad.
     pub(super) fn angle(&self, value: f64) -> f64 {
         if self.is_degree { value * PI / 180.0 } else { value }
+    }
+
+    /// The rotation of Euler angles that are in the unit and the sequence of the file.
+    pub(super) fn euler_rotation(&self, angles: [f64; 3]) -> Matrix3<f64> {
+        let mut out = Matrix3::identity();
+        for (letter, angle) in self.euler.chars().zip(angles) {
+            let axis = match letter.to_ascii_lowercase() {
+                'x' => Vector3::x(),
+                'y' => Vector3::y(),
+                _ => Vector3::z(),
+            };
+            let turn = rotation_about(&axis, self.angle(angle));
+            // Rotations about fixed axes multiply from the left.
+            out = if letter.is_ascii_lowercase() {
+                out * turn
+            } else {
+                turn * out
+            };
+        }
+        out
     }
 
     /// An inertia with the bounds of the file, applied to the principal moments as in MuJoCo.

@@ -104,14 +104,15 @@ pub(super) fn folder_of(path: &str) -> &str {
     &path[..path.rfind('/').map_or(0, |slash| slash + 1)]
 }
 
-/// Adds an element of an included file, without line breaks. A `<model>` is relative to the folder of this file.
+/// Adds an element of an included file, without line breaks. A `<model>` is relative to the folder of this file, and a
+/// `<mesh>` that is not found elsewhere.
 fn push_included(out: &mut String, text: &str, child: &Node, folder: &str) {
     let mut from = child.range().start;
-    let models = child
+    let named = child
         .descendants()
-        .filter(|node| node.has_tag_name("model") && !node.has_attribute(FILE_FOLDER));
-    for model in models.filter(|_| !folder.is_empty() && child.has_tag_name("asset")) {
-        let to = model.range().start + "<model".len();
+        .filter(|node| ["model", "mesh"].contains(&node.tag_name().name()) && !node.has_attribute(FILE_FOLDER));
+    for node in named.filter(|_| !folder.is_empty() && child.has_tag_name("asset")) {
+        let to = node.range().start + 1 + node.tag_name().name().len();
         out.push_str(&text[from..to].replace(['\n', '\r'], " "));
         let _ = write!(out, " {FILE_FOLDER}=\"");
         write_escaped(out, folder);

@@ -12,7 +12,7 @@ use super::description::DescriptionInertia;
 use super::geoms::GIVE_INERTIAL;
 use super::meshes::{MeshInertia, TriangleMesh};
 use super::mjcf::MjcfReader;
-use super::mjcf_include::FILE_FOLDER;
+use super::mjcf_include::{FILE_FOLDER, joined_path};
 use super::placed::{DescriptionPose, rotation_from_quaternion};
 use super::xml::{located_message, numbers, vector};
 
@@ -140,7 +140,13 @@ impl<'a> MjcfReader<'a> {
         };
         let main = &self.settings.main_settings().mesh_folder;
         let path = self.settings_of(entry).mesh_folder.path(file, main);
-        let bytes = read(&path).map_err(|fault| located_message(entry, &fault))?;
+        let mut bytes = read(&path);
+        // MuJoCo 4 also reads the file in the folder of the included file, unless it cuts paths down.
+        let include = entry.attribute(FILE_FOLDER).filter(|_| !main.strips_paths);
+        if let (Err(_), Some(folder)) = (&bytes, include) {
+            bytes = read(&joined_path(folder, file)).or(bytes);
+        }
+        let bytes = bytes.map_err(|fault| located_message(entry, &fault))?;
         TriangleMesh::read(&path, &bytes).map_err(|fault| located_message(entry, &format!("`{path}`: {fault}")))
     }
 }

@@ -13,15 +13,19 @@ mod couplings;
 mod description;
 mod geoms;
 mod locks;
+mod mesh_polygons;
 mod meshes;
 mod mjcf;
 mod mjcf_actuators;
 mod mjcf_attach;
 mod mjcf_compiler;
+mod mjcf_copies;
 mod mjcf_defaults;
 mod mjcf_equalities;
 mod mjcf_include;
 mod mjcf_meshes;
+mod mjcf_names;
+mod mjcf_of_urdf;
 mod model_text;
 mod placed;
 mod rig_text;
@@ -42,6 +46,7 @@ pub use mjcf_include::FileReader;
 pub use mjcf_meshes::MeshFiles;
 pub use thresholds::{LARGEST_DESCRIPTION, LARGEST_MESH};
 
+use std::borrow::Cow;
 use std::fmt;
 
 use description::RobotDescription;
@@ -175,7 +180,11 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
         ))
     })?;
     let readable = xml_repair::readable_xml(text);
-    let text = readable.as_ref();
+    let copied = mjcf_copies::expand_copies(&readable).map_err(ImportError)?;
+    if let Cow::Owned(changed) = &copied {
+        xml_budget::check_xml_budget(changed).map_err(ImportError)?;
+    }
+    let text = copied.as_ref();
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {

@@ -4,6 +4,7 @@
 //! - `--` in a comment: comments are emptied.
 //! - Blank lines before the XML declaration: they are moved behind it.
 //! - No space between two attributes: a space is added.
+//! - A `<!DOCTYPE>`: it is emptied, since no entity of it is needed to read a robot.
 //! - A prefix that no `xmlns` declares, such as `drake:`: it is declared in the root element. The prefix of macros,
 //!   `xacro:`, is not, because macros must be expanded.
 
@@ -40,13 +41,16 @@ fn repair_xml(text: &str) -> String {
             _ if rest.starts_with("<!--") => to("-->"),
             _ if rest.starts_with("<![CDATA[") => to("]]>"),
             _ if rest.starts_with("<?") => to("?>"),
+            _ if rest.starts_with("<!DOCTYPE") => doctype_length(rest),
             _ if rest.starts_with("<!") => to(">"),
             _ => {
                 root_name_end = root_name_end.or(Some(out.len() + 1 + name_at_start(&rest[1..]).len()));
                 push_tag(rest, &mut out, &mut prefixes)
             }
         };
-        if rest.starts_with("<!--") {
+        if rest.starts_with("<!DOCTYPE") {
+            out.extend(rest[..length].matches('\n'));
+        } else if rest.starts_with("<!--") {
             let lines = rest[..length].matches('\n').count();
             out.extend(["<!--", &"\n".repeat(lines), "-->"]);
         } else if rest.starts_with("<!") || rest.starts_with("<?") {
@@ -69,6 +73,29 @@ fn repair_xml(text: &str) -> String {
     let blank = &text[..text.len() - body.len()];
     out.insert_str(declaration.map_or(0, |end| end + 2), blank);
     out
+}
+
+/// The length of the `<!DOCTYPE>` at the start of a text, with the declarations in brackets.
+fn doctype_length(text: &str) -> usize {
+    let mut quote = None;
+    let mut is_inside = false;
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        if quote.is_none() && text[at..].starts_with("<!--") {
+            at = text[at..].find("-->").map_or(text.len(), |k| at + k + "-->".len());
+            continue;
+        }
+        at += c.len_utf8();
+        match (quote, c) {
+            (Some(open), _) if open == c => quote = None,
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[') => is_inside = true,
+            (None, ']') => is_inside = false,
+            (None, '>') if !is_inside => break,
+            _ => {}
+        }
+    }
+    at
 }
 
 /// The name at the start of a text, up to white space or the sign that ends a name.
@@ -127,6 +154,23 @@ mod tests {
         let line = |text: &str, part: &str| text[..text.find(part).unwrap()].matches('\n').count();
         assert_eq!(line(&mended, "<robot"), line(faulty, "<robot"));
         assert_eq!(line(&mended, "<drake"), line(faulty, "<drake"));
+    }
+
+    #[test]
+    fn document_types_are_emptied_with_the_same_lines() {
+        for document_type in [
+            "<!DOCTYPE robot>",
+            "<!DOCTYPE robot SYSTEM \"a>b.dtd\">",
+            "<!DOCTYPE robot [\n <!ENTITY e '>'>\n <!-- ] -->\n]>",
+        ] {
+            let text = format!("<?xml version=\"1.0\"?>\n{document_type}\n<robot name=\"r\"/>\n");
+            assert!(Document::parse(&text).is_err());
+            let mended = repair_xml(&text);
+            let document = Document::parse(&mended).unwrap_or_else(|fault| panic!("{fault}: {mended}"));
+            assert_eq!(document.root_element().attribute("name"), Some("r"));
+            let line = |text: &str| text[..text.find("<robot").unwrap()].matches('\n').count();
+            assert_eq!(line(&mended), line(&text));
+        }
     }
 
     /// Many prefixes cost no time: none is declared, and the text stays what it was.

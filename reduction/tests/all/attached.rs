@@ -178,7 +178,10 @@ fn what_cannot_be_attached_is_refused_with_its_place() {
             "no <model> with the name `other`",
         ),
         (r#"<attach model="ch"/>"#, "needs the attribute `prefix`"),
-        (r#"<attach body="b" prefix=""/>"#, "needs the attribute `model`"),
+        (
+            r#"<attach body="b" prefix=""/>"#,
+            "there is no body `b` before this element",
+        ),
         (
             r#"<attach model="ch" body="b9" prefix=""/>"#,
             "`sub/child.xml` has no body `b9`",

@@ -3,6 +3,7 @@
 mod approximations;
 mod attached;
 mod budgets;
+mod copies;
 mod couplings;
 mod descriptions;
 mod export;

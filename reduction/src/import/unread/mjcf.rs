@@ -36,7 +36,7 @@ pub(super) const RULES: [ElementRule; 41] = [
         attributes: "model",
         inner: "compiler option default worldbody equality tendon actuator",
         // Other sections have a remark of their own.
-        ignored: "asset visual statistic contact sensor custom size extension keyframe skin include",
+        ignored: "asset visual statistic contact sensor custom size extension keyframe skin include modelmill-remark",
     },
     ElementRule {
         element: "compiler",
