@@ -114,8 +114,8 @@ impl Host {
         self
     }
 
-    /// The host with a time limit, counted from this call: all jobs fail with [`Error::Cancelled`] once it is over. Jobs
-    /// that count their steps end at the next step, others at their end.
+    /// The host with a time limit, counted from this call: all jobs fail with [`Error::Cancelled`] once it is over.
+    /// Derivations, searches and jobs that count their steps end at the next step, others at their end.
     ///
     /// ```
     /// use std::time::Duration;

@@ -53,7 +53,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     // Base parameters are estimated, as a user would do with an unknown machine.
     let rods = diagnose(&model, &runs, FixedParameters::Known)?;
     story.diagnose(&place, &seen, &rods);
-    let edited = place.add(&rods, &flags)?;
+    let edited = place.add(&rods, &flags);
     story.add(&place, edited.as_ref());
     story.steps(&rods);
     place.add_file(RODS_PAGE, page(&rods, &flags)?);
@@ -187,14 +187,8 @@ impl TourFolder {
 
     /// Adds the model with the effects that were found. Returns the commands that do the same, and the difference of
     /// the files.
-    fn add(
-        &mut self,
-        findings: &DiagnosisFindings,
-        flags: &CommandLineSpelling,
-    ) -> CommandOutcome<Option<(Vec<String>, String)>> {
-        let Some(edited) = &findings.edited else {
-            return Ok(None);
-        };
+    fn add(&mut self, findings: &DiagnosisFindings, flags: &CommandLineSpelling) -> Option<(Vec<String>, String)> {
+        let edited = findings.edited.as_ref()?;
         self.add_file(EDITED, edited.text.as_str());
         let model = &findings.before.model;
         // The bundled recordings show one effect, and the tour keeps the given model file.
@@ -206,7 +200,7 @@ impl TourFolder {
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::colour_diff(&difference, terminal::style());
-        Ok(Some((commands, coloured)))
+        Some((commands, coloured))
     }
 }
 
