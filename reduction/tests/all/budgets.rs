@@ -148,7 +148,7 @@ fn attributes_of_large_default_classes_are_looked_up_in_time() {
 fn many_shapes_of_meshes_are_computed_in_time() {
     const N: usize = 15_000;
     let triangle = "vertex='0 0 0 1 0 0 0 1 0' face='";
-    let large = format!("<mesh name='large' inertia='shell' {triangle}{}'/>", "0 1 2 ".repeat(N));
+    let large = format!("<mesh name='large' inertia='shell' {triangle}{}'/>", "0 1 2 ".repeat(4 * N));
     let small = (0..N).fold(String::new(), |text, k| {
         text + &format!("<mesh name='m{k}' inertia='shell' {triangle}0 1 2'/>")
     });
@@ -162,7 +162,7 @@ fn many_shapes_of_meshes_are_computed_in_time() {
     let start = std::time::Instant::now();
     let imported = import(&text, &ImportOptions::default()).unwrap();
     // The square of the number took minutes.
-    assert!(start.elapsed().as_secs() < 8, "{:?}", start.elapsed());
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     let mass = N as f64 * (1.0 + 500.0);
     assert!(
         imported.model.contains(&format!("{mass}")),
