@@ -148,7 +148,10 @@ fn attributes_of_large_default_classes_are_looked_up_in_time() {
 fn many_shapes_of_meshes_are_computed_in_time() {
     const N: usize = 15_000;
     let triangle = "vertex='0 0 0 1 0 0 0 1 0' face='";
-    let large = format!("<mesh name='large' inertia='shell' {triangle}{}'/>", "0 1 2 ".repeat(4 * N));
+    let large = format!(
+        "<mesh name='large' inertia='shell' {triangle}{}'/>",
+        "0 1 2 ".repeat(4 * N)
+    );
     let small = (0..N).fold(String::new(), |text, k| {
         text + &format!("<mesh name='m{k}' inertia='shell' {triangle}0 1 2'/>")
     });
