@@ -103,6 +103,8 @@ pub enum DeriveError {
     RankChanged,
     /// The final check at new random points failed.
     NotConfirmed,
+    /// The caller requested to stop.
+    Stopped,
 }
 
 impl DeriveError {
@@ -203,6 +205,7 @@ impl fmt::Display for DeriveError {
             Self::NotConfirmed => {
                 f.write_str("the dependencies that were found are not valid at other poses")
             }
+            Self::Stopped => f.write_str("the derivation was stopped before its end; allow more time"),
         }
     }
 }

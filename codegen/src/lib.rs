@@ -23,6 +23,7 @@ mod reduce;
 mod regressor;
 #[cfg(any(test, feature = "review"))]
 pub mod review;
+mod stop;
 mod tree;
 
 pub use derive::base::BaseParameterEntry;
@@ -40,6 +41,7 @@ pub use reduce::{
     BaseReduction, ColumnDependency, FactorVariable, PowerProduct, RationalFunction, ReductionMethod,
     TrigonometricPolynomial,
 };
+pub use stop::StopRequest;
 pub use tree::expressions::ParameterMonomial;
 
 use modelmill_spec::Mechanism;
@@ -48,7 +50,12 @@ use modelmill_spec::Mechanism;
 ///
 /// A base is refused when its columns are almost dependent at the file's values, because its forces would be wrong.
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
-    let derivation = derive::derive(mechanism)?;
+    derive_until(mechanism, StopRequest::NEVER)
+}
+
+/// The same; fails with [`DeriveError::Stopped`] once `stop` is requested.
+pub fn derive_until(mechanism: &Mechanism, stop: StopRequest<'_>) -> Result<Derivation, DeriveError> {
+    let derivation = derive::derive(mechanism, stop)?;
     evaluate::lost_digits::check_lost_digits(&derivation)?;
     Ok(derivation)
 }

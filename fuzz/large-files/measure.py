@@ -21,7 +21,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 MODEL = ROOT / "model-spec/models/two_link.toml"
-RIG = ROOT / "model-spec/rigs/spidermill-rig.toml"
+RIG = ROOT / "model-spec/rigs/spidermill-full.toml"
 MAP = ["--map", "joint1=q1", "--map", "joint2=q2"]
 
 # Limits: seconds per MB of the file, with one second for the start of the program and its model; memory as multiples of
@@ -97,6 +97,9 @@ def texts():
     yield "mjcf-connects", "xml", lambda n: filled(world + "<body name='b'><joint name='j'/><geom size='1'/></body></worldbody><equality>", "<connect body1='b' anchor='1 0 0'/>", "</equality></mujoco>", n)
     yield "mjcf-tendons", "xml", lambda n: filled(world + "<body name='b'><joint name='j'/><geom size='1'/></body></worldbody><tendon>", lambda k: f"<fixed name='t{k}'><joint joint='j' coef='1'/></fixed>", "</tendon></mujoco>", n)
     yield "mjcf-sites", "xml", lambda n: filled(world + "<body name='b'><joint name='j'/><geom size='1'/>", lambda k: f"<site name='s{k}'/>", "</body></worldbody></mujoco>", n)
+    mesh = "<mesh name='m{k}' inertia='shell' vertex='0 0 0 1 0 0 0 1 0' face='0 1 2'/>"
+    yield "mjcf-meshes", "xml", lambda n: filled("<mujoco><asset>" + "".join(mesh.format(k=k) for k in range(max(1, n // 120))) + "</asset><worldbody><body>", lambda k: f"<geom type='mesh' mesh='m{k}'/>" if k < n // 120 else " " * 1000, "</body></worldbody></mujoco>", n)
+    yield "mjcf-mesh-used", "xml", lambda n: filled("<mujoco><asset><mesh name='m' inertia='shell' vertex='0 0 0 1 0 0 0 1 0' face='" + "0 1 2 " * max(1, n // 12) + "'/></asset><worldbody><body>", "<geom type='mesh' mesh='m'/>", "</body></worldbody></mujoco>", n)
     yield "mjcf-options", "xml", lambda n: filled("<mujoco>", "<option/><compiler/>", "<worldbody/></mujoco>", n)
     sdf = "<sdf version='1.9'><model name='m'>"
     yield "sdf-deep-models", "sdf", lambda n: filled("<sdf version='1.9'>", "<model name='m'>", "", n)

@@ -46,15 +46,16 @@ impl Host {
             let text = self.files().read_text(&path, LARGEST_DESCRIPTION);
             text.map_err(|error| format!("{} cannot be read: {}", path.display(), error.fault))
         };
-        let text = modelmill_reduction::expand_other_files(text, &read)
-            .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
         let read_mesh = |file: &str| self.read_mesh(Path::new(name), file);
         let options = Options {
             meshes: options.meshes.or(Some(MeshFiles(&read_mesh))),
             ..*options
         };
-        let imported =
-            modelmill_reduction::import(&text, &options).map_err(|error| Error::input(format!("{name}: {error}")))?;
+        let imported = self.run_job(&format!("importing {name}"), 0, |_| {
+            let text = modelmill_reduction::expand_other_files(text, &read)?;
+            modelmill_reduction::import(&text, &options).map_err(|error| error.to_string())
+        })?;
+        let imported = imported.map_err(|fault| Error::input(format!("{name}: {fault}")))?;
         let facts = imported.facts.into_iter().map(RecordingNote::info);
         let notes: Vec<RecordingNote> = (imported.remarks.into_iter().map(RecordingNote::warning))
             .chain(facts)

@@ -32,6 +32,19 @@ pub struct SilentProgress;
 
 impl ProgressListener for SilentProgress {}
 
+/// A listener that receives the jobs of another one, and no notes: those of models that repeat another model.
+pub(crate) struct ProgressWithoutNotes(pub(crate) Arc<dyn ProgressListener>);
+
+impl ProgressListener for ProgressWithoutNotes {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
+        self.0.on_job_start(what, total, job);
+    }
+
+    fn on_job_end(&self) {
+        self.0.on_job_end();
+    }
+}
+
 /// A running job: its progress, and whether it has been cancelled. Shared between the job and its listener.
 #[derive(Debug, Default)]
 pub struct JobHandle {
@@ -144,6 +157,10 @@ mod tests {
         fn on_job_end(&self) {
             self.heard.lock().unwrap().push("end".to_owned());
         }
+
+        fn on_note(&self, note: &RecordingNote) {
+            self.heard.lock().unwrap().push(format!("{note:?}"));
+        }
     }
 
     #[test]
@@ -156,6 +173,20 @@ mod tests {
         let found = run_job(&listener, None, "long", 0, |_| unreachable!("it was cancelled"));
         assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
         assert_eq!(*listener.heard.lock().unwrap(), ["short 2", "end", "long 0", "end"]);
+    }
+
+    /// A second model whose notes repeat those of the first one is still seen to be derived, and can be stopped.
+    #[test]
+    fn jobs_without_notes_reach_the_listener_and_can_be_cancelled() {
+        let listener = Arc::new(Listener {
+            stops: "deriving",
+            ..Listener::default()
+        });
+        let quiet = ProgressWithoutNotes(Arc::clone(&listener) as Arc<_>);
+        quiet.on_note(&RecordingNote::warning("again"));
+        let found = run_job(&quiet, None, "deriving", 0, |_| unreachable!("it was cancelled"));
+        assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
+        assert_eq!(*listener.heard.lock().unwrap(), ["deriving 0", "end"]);
     }
 
     #[test]

@@ -1,7 +1,5 @@
 //! `diff`: reports what a variant of a model changes; along recordings also changes of forces, power, work and error.
 
-use std::sync::Arc;
-
 use modelmill::model::ModelChanges;
 use modelmill::recording::PreparedRecording;
 use modelmill::variants::VariantComparison;
@@ -10,14 +8,13 @@ use modelmill::{Host, Model, RecordingNote};
 use crate::args::DiffArgs;
 use crate::failure::CommandOutcome;
 use crate::flags::FlagSpelling;
-use crate::terminal::progress::ProgressWithoutRemarks;
 use crate::{commands, terminal};
 
 /// Prints the changes between two models, and draws both into one picture if requested.
 pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     let before = commands::model(host, &args.before)?;
-    // Remarks on the second model would repeat those on the first; the listener drops them.
-    let quiet = host.clone().with_progress(Arc::new(ProgressWithoutRemarks::new()));
+    // Remarks on the second model would repeat those on the first.
+    let quiet = host.clone().without_notes();
     let after = commands::model(&quiet, &args.after)?;
     let inputs = before.files().chain(after.files());
     if let Some(target) = args.drawing.target(inputs)? {

@@ -32,12 +32,16 @@ pub(crate) fn run(host: &Host, args: &VerifyArgs) -> CommandOutcome {
         version: env!("CARGO_PKG_VERSION"),
         program_sha256: None,
     };
+    // Hashes read every file once more, so that they are left out of the table.
+    let inputs = if args.json {
+        FileFingerprint::all(&model, files.iter().map(|(role, path)| (*role, path.as_path())))?
+    } else {
+        Vec::new()
+    };
     if let Some(target) = &junit {
         target.write(&verified.junit(&FlagSpelling))?;
     }
     if args.json {
-        // Hashes read every file once more, so that they are left out of the table.
-        let inputs = FileFingerprint::all(&model, files.iter().map(|(role, path)| (*role, path.as_path())))?;
         let program = program_sha256();
         context.inputs = &inputs;
         context.program_sha256 = program.as_deref();

@@ -103,26 +103,6 @@ impl ProgressListener for TerminalProgress {
     }
 }
 
-/// As [`TerminalProgress`], but drops remarks; for callers that print them later.
-pub(crate) struct ProgressWithoutRemarks(TerminalProgress);
-
-impl ProgressWithoutRemarks {
-    /// Starts a clock, as [`TerminalProgress::new`].
-    pub(crate) fn new() -> Self {
-        Self(TerminalProgress::new())
-    }
-}
-
-impl ProgressListener for ProgressWithoutRemarks {
-    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
-        self.0.on_job_start(what, total, job);
-    }
-
-    fn on_job_end(&self) {
-        self.0.on_job_end();
-    }
-}
-
 /// A bar if the number of steps is known, else a spinner.
 fn new_bar(message: &str, total: usize) -> ProgressBar {
     let target = ProgressDrawTarget::stderr();

@@ -12,19 +12,24 @@ pub use for_code::BaseFormulas;
 
 use crate::DeriveError;
 use crate::expr::Graph;
-use crate::programs::cheapest::PASSES;
+use crate::programs::cheapest::{FormSearch, PASSES};
 use crate::programs::closing::PassiveClosure;
 use crate::programs::programs;
 use crate::reduce::{BaseReduction, reduce, without_reduction};
 use crate::regressor::{UnreducedEquations, unreduced_equations};
+use crate::stop::StopRequest;
 use crate::tree::checks::check_values;
 use crate::tree::expressions::ParameterMonomial;
 
 /// Derives the inverse dynamics of a mechanism and reduces it to base parameters. Digits lost at the file's values are
 /// not checked here.
-pub(crate) fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
-    let derivation = derive_with(mechanism, PASSES.len(), |graph, equations| {
-        reduce(graph, mechanism, equations)
+pub(crate) fn derive(mechanism: &Mechanism, stop: StopRequest<'_>) -> Result<Derivation, DeriveError> {
+    let search = FormSearch {
+        n_passes: PASSES.len(),
+        stop,
+    };
+    let derivation = derive_with(mechanism, search, |graph, equations| {
+        reduce(graph, mechanism, equations, stop)
     })?;
     checks::check_results(&derivation)?;
     Ok(derivation)
@@ -37,23 +42,26 @@ pub fn derive_columns(
     wanted: &dyn Fn(&ParameterMonomial) -> bool,
 ) -> Result<Derivation, DeriveError> {
     // Columns are evaluated once along each recording, which takes less time than a search for cheaper forms.
-    derive_with(mechanism, 0, |_, equations| Ok(without_reduction(equations, wanted)))
+    derive_with(mechanism, FormSearch::NONE, |_, equations| {
+        Ok(without_reduction(equations, wanted))
+    })
 }
 
-/// The stages in their order. `reduce` goes from p_g to p_min, and `passes` is the number of passes that search for
-/// cheaper forms.
+/// The stages in their order. `reduce` goes from p_g to p_min, and `search` states how cheaper forms are searched.
 fn derive_with(
     mechanism: &Mechanism,
-    passes: usize,
+    search: FormSearch<'_>,
     reduce: impl FnOnce(&mut Graph, &UnreducedEquations) -> Result<BaseReduction, DeriveError>,
 ) -> Result<Derivation, DeriveError> {
     check_values(mechanism)?;
     let mut graph = Graph::new();
     // Equations, reduction, closed loops, programs.
     let equations = unreduced_equations(&mut graph, mechanism)?;
+    search.stop.check()?;
     let reduction = reduce(&mut graph, &equations)?;
+    search.stop.check()?;
     let closing = PassiveClosure::new(&mut graph, mechanism, &equations)?;
-    let programs = programs(&mut graph, mechanism, &equations, &reduction, &closing, passes)?;
+    let programs = programs(&mut graph, mechanism, &equations, &reduction, &closing, search)?;
     Ok(Derivation {
         mechanism: mechanism.clone(),
         graph,

@@ -285,6 +285,7 @@ mod tests {
     use std::fmt::Write as _;
 
     use super::*;
+    use crate::StopRequest;
     use crate::expr::Rational;
     use crate::{RationalFunction, derive};
 
@@ -387,7 +388,7 @@ mod tests {
                     assert!(exponent <= 9, "1e-{exponent} leaves too few digits");
                 }
                 Err(DeriveError::DigitsLost { .. }) => {
-                    let derivation = crate::derive::derive(&mechanism).unwrap();
+                    let derivation = crate::derive::derive(&mechanism, StopRequest::NEVER).unwrap();
                     let [error, emitted] = errors_by_hand(&derivation);
                     let worst = error.max(emitted);
                     assert!(worst > 0.1 * MOST_LOST, "1e-{exponent}: {worst:e}");
@@ -405,7 +406,8 @@ mod tests {
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
-            let derivation = crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
+            let derivation =
+                crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES), StopRequest::NEVER).unwrap();
             let [error, _] = errors_by_hand(&derivation);
             assert!(error < 10_f64.powi(exponent - 15), "1e-{exponent}: {error:e}");
         }

@@ -76,8 +76,12 @@ fn count_operations(
     let value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
     let nothing = BTreeMap::new();
     let weigh = |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
-    let forces = cheapest::cheapest_total(graph, mechanism, equations, &value, of_forms, &weigh)?;
-    let columns = cheapest::cheapest_columns(graph, mechanism, equations, &retained, of_forms, &weigh)?;
+    let search = cheapest::FormSearch {
+        n_passes: of_forms,
+        ..cheapest::FormSearch::NONE
+    };
+    let forces = cheapest::cheapest_total(graph, mechanism, equations, &value, search, &weigh)?;
+    let columns = cheapest::cheapest_columns(graph, mechanism, equations, &retained, search, &weigh)?;
     let regressor: Vec<ExprId> = columns.into_iter().flatten().collect();
     Ok([forces, regressor].map(|outputs| {
         let program = closing.program(graph, equations, &outputs);

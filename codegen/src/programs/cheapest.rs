@@ -15,6 +15,7 @@ use crate::expr::{ExprId, Graph};
 use crate::newton_euler::{self, CarryDepths, RecursionStyle};
 use crate::regressor::UnreducedEquations;
 use crate::regressor::form::{ColumnForm, RecursionFrames, TotalForm};
+use crate::stop::StopRequest;
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
 
@@ -30,6 +31,23 @@ const MOST_SEARCHED_ENTRIES: usize = 5000;
 /// Cost of outputs, in additions.
 pub(crate) type CostFunction<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 
+/// How cheaper forms are searched.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FormSearch<'a> {
+    /// How many of [`PASSES`] are tried.
+    pub(crate) n_passes: usize,
+    /// When the search stops.
+    pub(crate) stop: StopRequest<'a>,
+}
+
+impl FormSearch<'_> {
+    /// The plain form.
+    pub(crate) const NONE: Self = Self {
+        n_passes: 0,
+        stop: StopRequest::NEVER,
+    };
+}
+
 /// Searches for the cheapest form, pass by pass; a change that does not lower the cost is discarded. Returns the form
 /// and its outputs.
 ///
@@ -40,6 +58,7 @@ fn search_cheapest_form<F: Copy>(
     plain: F,
     steps: &[ChangeFamilies<F>],
     weigh: CostFunction<'_>,
+    stop: StopRequest<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
 ) -> Result<(F, Vec<ExprId>), DeriveError> {
     // The best form so far with its outputs and cost.
@@ -51,6 +70,7 @@ fn search_cheapest_form<F: Copy>(
             let before = form;
             let mut last = usize::MAX;
             for change in family {
+                stop.check()?;
                 let changed = change(before);
                 let outputs = write(graph, changed)?;
                 // Many changes have no effect on planar mechanisms, and computing the cost takes longest.
@@ -105,17 +125,17 @@ pub(crate) const PASSES: [&str; 5] = [
     "inertia rotated instead of motion, forces computed in one frame",
 ];
 
-/// The columns of some products, one entry per drive, in the cheapest form after the first `n_passes` passes.
+/// The columns of some products, one entry per drive, in the cheapest form that `search` finds.
 pub(crate) fn cheapest_columns(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
     products: &[ParameterMonomial],
-    n_passes: usize,
+    search: FormSearch<'_>,
     weigh: CostFunction<'_>,
 ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
     let every = choose_column_interval(products.len() * depth_of_tree(&equations.tree));
-    cheapest_columns_by_sample(graph, mechanism, equations, products, n_passes, every, weigh)
+    cheapest_columns_by_sample(graph, mechanism, equations, products, search, every, weigh)
 }
 
 /// Depth of the tree, in links.
@@ -141,7 +161,7 @@ fn cheapest_columns_by_sample(
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
     products: &[ParameterMonomial],
-    n_passes: usize,
+    search: FormSearch<'_>,
     every: usize,
     weigh: CostFunction<'_>,
 ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
@@ -192,7 +212,7 @@ fn cheapest_columns_by_sample(
     if !has_parallel_axes(tree) {
         steps[0].clear();
     }
-    steps.truncate(n_passes);
+    steps.truncate(search.n_passes);
     let mut written = FrameCache::default();
     let mut write = |graph: &mut Graph, form: ColumnForm, products: &[ParameterMonomial]| {
         let key = (form.style, form.fixed_axes);
@@ -202,28 +222,29 @@ fn cheapest_columns_by_sample(
     // Outputs are searched as one list, and then cut into columns. Of a large tree some columns decide for all.
     let searched: Vec<ParameterMonomial> = products.iter().step_by(every).cloned().collect();
     let n_drives = mechanism.drives.len();
-    let (form, outputs) = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
+    let found = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, search.stop, |graph, form| {
         Ok(write(graph, form, &searched)?.into_iter().flatten().collect())
-    })?;
+    });
+    let (form, outputs) = found?;
     if every > 1 {
         return write(graph, form, products);
     }
     Ok(outputs.chunks(n_drives.max(1)).map(<[_]>::to_vec).collect())
 }
 
-/// The inverse dynamics in the cheapest form after the first `n_passes` passes.
+/// The inverse dynamics in the cheapest form that `search` finds.
 pub(crate) fn cheapest_total(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
     value: &dyn Fn(&ParameterMonomial) -> ExprId,
-    n_passes: usize,
+    search: FormSearch<'_>,
     weigh: CostFunction<'_>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let mut steps = total_form_steps(&equations.tree);
-    steps.truncate(n_passes);
+    steps.truncate(search.n_passes);
     let mut written = FrameCache::default();
-    let found = search_cheapest_form(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
+    let found = search_cheapest_form(graph, TotalForm::PLAIN, &steps, weigh, search.stop, |graph, form| {
         let key = (form.style, form.fixed_axes);
         let frames = written.frames_for(graph, equations, &equations.gravity, key);
         equations.inverse_dynamics(graph, mechanism, frames, value, form)
@@ -249,6 +270,7 @@ pub(crate) fn best_total(
         TotalForm::PLAIN,
         &total_form_steps(&equations.tree),
         weigh,
+        StopRequest::NEVER,
         |graph, form| {
             let key = (form.style, form.fixed_axes);
             let frames = written.frames_for(graph, equations, &gravity, key);
@@ -337,9 +359,12 @@ mod tests {
         let equations = unreduced_equations(&mut graph, mechanism).unwrap();
         let weigh = |graph: &mut Graph, outputs: &[ExprId]| cost(graph, outputs);
         let products = equations.products.clone();
-        let passes = PASSES.len();
+        let search = FormSearch {
+            n_passes: PASSES.len(),
+            ..FormSearch::NONE
+        };
         let columns =
-            cheapest_columns_by_sample(&mut graph, mechanism, &equations, &products, passes, every, &weigh).unwrap();
+            cheapest_columns_by_sample(&mut graph, mechanism, &equations, &products, search, every, &weigh).unwrap();
         let outputs: Vec<ExprId> = columns.into_iter().flatten().collect();
         cost(&graph, &outputs)
     }

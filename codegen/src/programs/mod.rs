@@ -16,6 +16,7 @@ use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::loops::magnitude::LoopSize;
 use crate::lower::{LoweringRequest, StraightLineProgram, lower};
+use crate::programs::cheapest::FormSearch;
 use crate::programs::closing::PassiveClosure;
 use crate::reduce::{BaseReduction, base};
 use crate::regressor::UnreducedEquations;
@@ -62,14 +63,14 @@ pub struct ModelPrograms {
     pub scale: Option<StraightLineProgram>,
 }
 
-/// Writes all programs. The first `passes` of [`cheapest::PASSES`] search for cheaper forms.
+/// Writes all programs. `search` states which passes search for cheaper forms.
 pub(crate) fn programs(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
     reduction: &BaseReduction,
     closing: &PassiveClosure,
-    passes: usize,
+    search: FormSearch<'_>,
 ) -> Result<ModelPrograms, DeriveError> {
     let n_drives = mechanism.drives.len();
 
@@ -128,15 +129,16 @@ pub(crate) fn programs(
     let base_parameters = plain_program(graph, &base_expressions);
     let nothing = BTreeMap::new();
     let weigh = |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
-    let regressor = cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
+    let regressor = cheapest::cheapest_columns(graph, mechanism, equations, &retained, search, &weigh)?;
     let regressor = row_by_row(&regressor);
-    let inverse_dynamics = cheapest::cheapest_total(graph, mechanism, equations, &base_value, passes, &weigh)?;
+    let inverse_dynamics = cheapest::cheapest_total(graph, mechanism, equations, &base_value, search, &weigh)?;
     // The scale is needed only if lengths are in the loops.
     let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
         let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual).relative_scale(graph);
         plain_program(graph, &[scale])
     });
+    search.stop.check()?;
     // Expressions are closed over the active coordinates and lowered.
     let n_motion = drives.len();
     let together = [drives.as_slice(), &inverse_dynamics].concat();

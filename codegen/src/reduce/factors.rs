@@ -14,6 +14,7 @@ use super::sample::{ColumnEvaluation, SampledRegressor};
 use super::tree_columns::TreeColumns;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
+use crate::stop::StopRequest;
 
 /// Largest number of field operations for the factors, which takes about a minute.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
@@ -53,6 +54,7 @@ pub(super) fn n_quotients(
     regressor: &SampledRegressor,
     tree: &TreeStructure,
     variables: &[ConstantOccurrence],
+    stop: StopRequest<'_>,
     stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
     let direct = dependences.relations.iter().filter(|r| r.has_retained_only());
@@ -60,7 +62,7 @@ pub(super) fn n_quotients(
     // Only relations to retained columns have factors on retained columns. Factors that are known are polynomials.
     let direct = direct.into_iter().filter(|r| r.factors.is_none());
     let (in_tree, others): (Vec<ColumnRelation>, Vec<ColumnRelation>) = direct.partition(|r| r.is_in_tree);
-    let mut budget = OperationBudget::new(MOST_OPERATIONS);
+    let mut budget = OperationBudget::new(MOST_OPERATIONS, stop);
     let mut found = 0;
     if let Some(tree) = tree.columns.as_ref().filter(|_| !in_tree.is_empty()) {
         let mut oracle = TreeFactorOracle {
@@ -169,7 +171,7 @@ pub(super) struct FactorSearch<'a> {
     /// Values of all constants in the file, at which factors should be finite.
     pub(super) values: &'a [f64],
     /// Remaining field operations.
-    pub(super) budget: OperationBudget,
+    pub(super) budget: OperationBudget<'a>,
 }
 
 impl FactorSearch<'_> {
@@ -256,7 +258,7 @@ fn reconstruct_factors<O: PrimeFieldOracle>(
 }
 
 /// Evaluates the factors of relations from the links of a tree.
-struct TreeFactorOracle<'a> {
+struct TreeFactorOracle<'a, 'b> {
     /// Source of constants at which all functions exist.
     regressor: &'a SampledRegressor,
     /// The links.
@@ -264,10 +266,10 @@ struct TreeFactorOracle<'a> {
     /// Relations whose factors are evaluated.
     relations: &'a [ColumnRelation],
     /// Remaining field operations.
-    budget: &'a mut OperationBudget,
+    budget: &'a mut OperationBudget<'b>,
 }
 
-impl PrimeFieldOracle for TreeFactorOracle<'_> {
+impl PrimeFieldOracle for TreeFactorOracle<'_, '_> {
     fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
@@ -292,7 +294,7 @@ impl PrimeFieldOracle for TreeFactorOracle<'_> {
 }
 
 /// Evaluates the factors of relations from points of motion.
-struct MotionFactorOracle<'a> {
+struct MotionFactorOracle<'a, 'b> {
     /// The regressor's columns at random points.
     regressor: &'a SampledRegressor,
     /// Dependences that the columns must show again.
@@ -306,17 +308,17 @@ struct MotionFactorOracle<'a> {
     /// Random numbers for the points.
     sampling: RandomStream,
     /// Remaining field operations.
-    budget: &'a mut OperationBudget,
+    budget: &'a mut OperationBudget<'b>,
 }
 
-impl<'a> MotionFactorOracle<'a> {
+impl<'a, 'b> MotionFactorOracle<'a, 'b> {
     /// Evaluates the factors of relations at points that `stream` draws.
     fn new(
         regressor: &'a SampledRegressor,
         dependences: &'a DependenceStructure,
         relations: &'a [ColumnRelation],
         stream: &RandomStream,
-        budget: &'a mut OperationBudget,
+        budget: &'a mut OperationBudget<'b>,
     ) -> Self {
         let columns: BTreeSet<usize> = (relations.iter())
             .flat_map(|relation| relation.columns().chain([relation.column]))
@@ -334,7 +336,7 @@ impl<'a> MotionFactorOracle<'a> {
     }
 }
 
-impl PrimeFieldOracle for MotionFactorOracle<'_> {
+impl PrimeFieldOracle for MotionFactorOracle<'_, '_> {
     fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
@@ -377,7 +379,7 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
 }
 
 /// Evaluates wanted factors from relations whose factors are all known; much cheaper than from points of motion.
-struct RelationFactorOracle<'a> {
+struct RelationFactorOracle<'a, 'b> {
     /// The relations.
     related: &'a SolvedRelations,
     /// Source of constants at which all functions exist.
@@ -385,10 +387,10 @@ struct RelationFactorOracle<'a> {
     /// Pairs of a dependent and a retained column.
     wanted: Vec<(usize, usize)>,
     /// Remaining field operations.
-    budget: &'a mut OperationBudget,
+    budget: &'a mut OperationBudget<'b>,
 }
 
-impl PrimeFieldOracle for RelationFactorOracle<'_> {
+impl PrimeFieldOracle for RelationFactorOracle<'_, '_> {
     fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
@@ -479,7 +481,7 @@ mod tests {
                 variables: &variables,
                 roots: &roots,
                 values: &values,
-                budget: OperationBudget::new(operations),
+                budget: OperationBudget::new(operations, StopRequest::NEVER),
             };
             find_factors(search, &mut stream)
         };

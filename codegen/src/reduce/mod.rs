@@ -49,6 +49,7 @@ use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
 use crate::regressor::UnreducedEquations;
+use crate::stop::StopRequest;
 use crate::tree::expressions::ParameterMonomial;
 use constants::{constant_occurrences, root_radicands};
 use dependences::DependenceStructure;
@@ -69,6 +70,7 @@ pub(crate) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
+    stop: StopRequest<'_>,
 ) -> Result<BaseReduction, DeriveError> {
     let UnreducedEquations {
         projection,
@@ -85,7 +87,7 @@ pub(crate) fn reduce(
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
-    let exact = reduce_exactly(graph, mechanism, equations, &effective, &preference, &outputs);
+    let exact = reduce_exactly(graph, mechanism, equations, &effective, &preference, &outputs, stop);
     let exact = exact.and_then(|found| {
         // Loops are sampled on their complete algebraic variety, but machines live on the branch of the nominal pose.
         let is_contradicted = !projection.loops.closures.is_empty()
@@ -109,7 +111,7 @@ pub(crate) fn reduce(
         ) => {
             let order = preference.own_first.iter();
             let order: Vec<usize> = order.map(|k| effective[*k]).collect();
-            numeric::reduce(graph, mechanism, projection, candidates, columns, &order, because)
+            numeric::reduce(graph, mechanism, equations, &order, because, stop)
         }
         exact => exact,
     }
@@ -123,6 +125,7 @@ fn reduce_exactly(
     effective: &[usize],
     preference: &RetentionPreference,
     outputs: &[ExprId],
+    stop: StopRequest<'_>,
 ) -> Result<BaseReduction, DeriveError> {
     let (projection, candidates) = (&equations.projection, &equations.products);
     let regressor = sample_regressor(graph, mechanism, projection, outputs, effective.len())?;
@@ -137,7 +140,7 @@ fn reduce_exactly(
     if preference.own_first != preference.declared {
         let other = DependenceStructure::find_dependences(&regressor, &tree, &preference.own_first, &mut stream)?;
         let mut n_quotients = |dependences: &DependenceStructure| {
-            factors::n_quotients(dependences, &regressor, &tree, &variables, &mut stream)
+            factors::n_quotients(dependences, &regressor, &tree, &variables, stop, &mut stream)
         };
         // The second order is used if its factors have fewer sums in denominators.
         if other.pivots != dependences.pivots && n_quotients(&other)? < n_quotients(&dependences)? {
@@ -164,14 +167,16 @@ fn reduce_exactly(
             variables: &variables,
             roots: &roots,
             values: &values,
-            budget: OperationBudget::new(factors::MOST_OPERATIONS),
+            budget: OperationBudget::new(factors::MOST_OPERATIONS, stop),
         };
         let factors = factors::find_factors(search, stream)?;
+        stop.check()?;
         let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
         reduction.confirm_reduction(&regressor, &dependences.shown, stream)?;
         Ok(reduction)
     };
     // Columns that nearly coincide at the file's values may be retained in place of others.
+    stop.check()?;
     let better = conditioned::exchange_columns(
         graph,
         mechanism,

@@ -27,7 +27,9 @@ use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
+use crate::regressor::UnreducedEquations;
 use crate::regressor::projection::LoopProjection;
+use crate::stop::StopRequest;
 use crate::tree::expressions::ParameterMonomial;
 
 /// A column counts as dependent if its residual is below this share of its size, and as zero if it is below this share
@@ -58,24 +60,24 @@ const ROUNDS: usize = 4;
 pub(super) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &LoopProjection,
-    candidates: &[ParameterMonomial],
-    columns: &[Vec<ExprId>],
+    equations: &UnreducedEquations,
     order: &[usize],
     because: DeriveError,
+    stop: StopRequest<'_>,
 ) -> Result<BaseReduction, DeriveError> {
+    let (projection, candidates, columns) = (&equations.projection, &equations.products, &equations.columns);
     let mut states = WalkSampler::new(graph, mechanism, projection, columns)?;
     // More rows than columns, so that dependences cannot appear by chance.
     let n_rows = columns.len() + columns.len() / 4 + 20;
     let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-    let mut rows = states.next_rows(n_rows)?;
+    let mut rows = states.next_rows(n_rows, stop)?;
     // Equations that contradict each other in the last digits would look like independent columns.
     if states.close_by_constants() {
-        rows = match states.next_rows(n_rows) {
+        rows = match states.next_rows(n_rows, stop) {
             Ok(closed) if states.closure_error() <= FURTHER * NO_CONTRADICTION => closed,
             _ => {
                 states.restore_constants();
-                states.next_rows(n_rows)?
+                states.next_rows(n_rows, stop)?
             }
         };
     }
@@ -97,7 +99,7 @@ pub(super) fn reduce(
         let constants = FileConstants::new(mechanism, &|i| states.constant_value(i).cloned(), rounding.min(1e-10));
         let (mut found, effective) = numeric_reduction(&constants, candidates, &w, &tried, &base, rounding);
         // The factors as written are checked at states that were not used.
-        let further = states.next_rows(n_rows)?;
+        let further = states.next_rows(n_rows, stop)?;
         let residual = ObservationColumns::new(&further, columns.len()).largest_residual(&found, &effective, &values);
         // Terms below the rounding error are dropped, each by itself.
         let left_out = rounding * base.kept.len() as f64;
@@ -432,7 +434,7 @@ mod tests {
             let mechanism = model(name);
             let mut graph = Graph::new();
             let found = unreduced_equations(&mut graph, &mechanism).expect("equations");
-            let exact = crate::reduce::reduce(&mut graph, &mechanism, &found).expect("a base");
+            let exact = crate::reduce::reduce(&mut graph, &mechanism, &found, StopRequest::NEVER).expect("a base");
             assert!(matches!(exact.method, ReductionMethod::Exact { .. }), "{name}");
             let order: Vec<usize> = (0..found.columns.len())
                 .filter(|k| found.columns[*k].iter().any(|x| *x != Graph::ZERO))
@@ -440,11 +442,10 @@ mod tests {
             let numeric = reduce(
                 &mut graph,
                 &mechanism,
-                &found.projection,
-                &found.products,
-                &found.columns,
+                &found,
                 &order,
                 DeriveError::NotConfirmed,
+                StopRequest::NEVER,
             )
             .expect("a base");
             assert_eq!(numeric.retained.len(), exact.retained.len(), "{name}");

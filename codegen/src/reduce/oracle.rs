@@ -4,6 +4,7 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use crate::DeriveError;
 use crate::expr::FieldPoint;
+use crate::stop::StopRequest;
 
 /// Functions that can be evaluated in every prime field, but not inspected.
 pub(crate) trait PrimeFieldOracle {
@@ -30,24 +31,28 @@ pub(crate) trait PrimeFieldOracle {
 /// Number of field operations that may still be done. A limit in seconds would give different results on different
 /// machines.
 #[derive(Clone, Debug)]
-pub(super) struct OperationBudget {
+pub(super) struct OperationBudget<'a> {
     /// The limit.
     all: u64,
     /// Remaining operations.
     left: u64,
+    /// The caller's request to stop before.
+    stop: StopRequest<'a>,
 }
 
-impl OperationBudget {
-    /// A budget of some operations, none of them used.
-    pub(super) fn new(operations: u64) -> Self {
+impl<'a> OperationBudget<'a> {
+    /// A budget of some operations, none of them used, that ends once `stop` is requested.
+    pub(super) fn new(operations: u64, stop: StopRequest<'a>) -> Self {
         Self {
             all: operations,
             left: operations,
+            stop,
         }
     }
 
-    /// Uses some operations; an error if fewer remain.
+    /// Uses some operations; an error if fewer remain, or the caller requested to stop.
     pub(super) fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+        self.stop.check()?;
         let operations = u64::try_from(operations).unwrap_or(u64::MAX);
         let left = self.left.checked_sub(operations);
         self.left = left.ok_or(DeriveError::FactorsTooLong { operations: self.all })?;

@@ -16,6 +16,7 @@ use crate::expr::{Atom, BigFloatPoint, EvaluationTape, ExprId, Graph};
 use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::loops::walk::{NEARLY_CLOSED, PoseWalk, all_residuals};
 use crate::regressor::projection::LoopProjection;
+use crate::stop::StopRequest;
 
 /// Evaluates rows of the regressor at successive states of one walk.
 pub(super) struct WalkSampler<'a> {
@@ -115,7 +116,11 @@ impl<'a> WalkSampler<'a> {
     ///
     /// # Errors
     /// [`DeriveError::NoPointFound`] if the walk makes no progress or the rows have no values.
-    pub(super) fn next_rows(&mut self, wanted: usize) -> Result<Vec<Vec<BigFloat>>, DeriveError> {
+    pub(super) fn next_rows(
+        &mut self,
+        wanted: usize,
+        stop: StopRequest<'_>,
+    ) -> Result<Vec<Vec<BigFloat>>, DeriveError> {
         // Draws per state.
         const TRIES: usize = 10;
         /// Number of consecutive failures after which the walk is given up.
@@ -124,6 +129,7 @@ impl<'a> WalkSampler<'a> {
         let mut rows = Vec::new();
         let (mut n_found, mut tries, mut stuck) = (0, 0, 0);
         while n_found < n_states {
+            stop.check()?;
             tries += 1;
             if tries > TRIES * n_states || stuck == STUCK {
                 return Err(DeriveError::NoPointFound { draws: tries });

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_identify::{FitFile, ReadOptions, SignalRecording};
-use modelmill_reduction::{ImportOptions, import};
+use modelmill_reduction::{ImportOptions, MeshFiles, import};
 
 use crate::budget::ReaderBudget;
 
@@ -59,6 +59,29 @@ pub(crate) fn read_description(input: &[u8], budget: ReaderBudget) {
     budget.run(input, || {
         if let Err(fault) = import(&text, &ImportOptions::default()) {
             assert!(!fault.to_string().is_empty(), "a fault without words");
+        }
+    });
+}
+
+/// Reads a mesh in each of the three formats, as the shape of a body.
+pub(crate) fn read_mesh(input: &[u8], budget: ReaderBudget) {
+    budget.run(input, || {
+        for file in ["a.stl", "a.obj", "a.msh"] {
+            for inertia in ["legacy", "exact", "shell"] {
+                let robot = format!(
+                    "<mujoco><asset><mesh name='a' file='{file}' inertia='{inertia}'/></asset><worldbody><body>\
+                     <joint name='j' axis='0 0 1'/><geom type='mesh' mesh='a'/></body></worldbody>\
+                     <actuator><motor joint='j'/></actuator></mujoco>"
+                );
+                let read = |_: &str| Ok(input.to_vec());
+                let options = ImportOptions {
+                    meshes: Some(MeshFiles(&read)),
+                    ..ImportOptions::default()
+                };
+                if let Err(fault) = import(&robot, &options) {
+                    assert!(!fault.to_string().is_empty(), "a fault without words");
+                }
+            }
         }
     });
 }

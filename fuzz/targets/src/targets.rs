@@ -2,8 +2,8 @@
 
 use crate::budget::ReaderBudget;
 use crate::readers::{
-    read_closures, read_description, read_fit, read_library, read_model, read_plan, read_recording, read_recording_of,
-    read_rig,
+    read_closures, read_description, read_fit, read_library, read_mesh, read_model, read_plan, read_recording,
+    read_recording_of, read_rig,
 };
 
 /// A reader with its corpus.
@@ -19,7 +19,7 @@ pub struct FuzzTarget {
 }
 
 /// All targets.
-pub const TARGETS: [FuzzTarget; 19] = [
+pub const TARGETS: [FuzzTarget; 20] = [
     target(
         "csv",
         &[
@@ -63,6 +63,7 @@ pub const TARGETS: [FuzzTarget; 19] = [
     target("mjcf", &[], mjcf),
     target("sdf", &[], sdf),
     target("closures", &[], closures),
+    target("mesh", &[], mesh),
     target("model", &["model-spec/models/*.toml"], model),
     target("library", &["model-spec/library/*.toml"], library),
     target("rig", &["model-spec/rigs/spidermill-*.toml"], rig),
@@ -148,6 +149,11 @@ pub fn sdf(input: &[u8]) {
 /// A file of closures, `robot.yaml`.
 pub fn closures(input: &[u8]) {
     read_closures(input, ReaderBudget::DESCRIPTION);
+}
+
+/// A mesh of an MJCF: STL, OBJ or MSH.
+pub fn mesh(input: &[u8]) {
+    read_mesh(input, ReaderBudget::DESCRIPTION);
 }
 
 /// A model file.

@@ -238,6 +238,9 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     let found = in_time::find_changes(problem, &problem.base.iter().collect::<Vec<_>>());
     problem.add_changes(found);
     let (mut diagnosis, later) = diagnose_cleaned(problem, supply, with(cleaned.clone()));
+    if supply.is_cancelled() {
+        return diagnosis;
+    }
     // A change that is hidden by a large missing effect is visible only in the residual of the effects found.
     if problem.add_changes(later) {
         (diagnosis, _) = diagnose_cleaned(problem, supply, with(cleaned));
@@ -250,7 +253,7 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
     } = &diagnosis;
     // A hum among the frequencies of the motion is visible only after the model has been fitted.
     let slow = hum::slow_lines(problem, rest, again, unexplained);
-    if slow.is_empty() {
+    if slow.is_empty() || supply.is_cancelled() {
         return diagnosis;
     }
     // Start again from the original forces without that hum.
@@ -468,7 +471,7 @@ impl EffectSelector<'_> {
     /// Proposes laws for the residual of a set, with the places where they may act; empty if only effects are
     /// requested.
     fn find_laws(&self, picks: &[SelectedEffect], left: &SetResidual) -> (Vec<LawSite>, Vec<LawProposal>) {
-        if self.problem.effects_only {
+        if self.problem.effects_only || self.provider.is_cancelled() {
             return (Vec::new(), Vec::new());
         }
         let left = laws::ResidualView {

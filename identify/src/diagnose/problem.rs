@@ -209,6 +209,11 @@ pub trait ColumnProvider {
     fn sites(&self) -> Vec<LawSite> {
         Vec::new()
     }
+
+    /// Whether nobody needs the result any more: the search then ends early, and its result is incomplete.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// Provider for problems in which all columns are known from the start.

@@ -90,6 +90,12 @@ impl EffectSelector<'_> {
                 break;
             }
         }
+        if self.provider.is_cancelled() {
+            return EffectSearchResult {
+                steps,
+                rejected: refused,
+            };
+        }
         // Backward: exchange members for better or simpler ones, then remove those that are not needed.
         let exchanged = self.exchange(accepted.clone());
         let pruned = self.prune(exchanged);
@@ -247,7 +253,7 @@ impl EffectSelector<'_> {
         // Stop after a number of tests, since each needs fits on blocks.
         let mut tested = 0;
         for trial in trials {
-            if tested == TESTED {
+            if tested == TESTED || self.provider.is_cancelled() {
                 break;
             }
             // Columns that depend on the fit are computed for this set before it is tested.

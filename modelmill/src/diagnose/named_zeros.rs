@@ -1,14 +1,11 @@
 //! Zeros that a model file writes as coordinates of points, as constants of a model in memory. A zero has no name, so a
 //! search for wrong constants could not try it otherwise.
 
-use std::sync::Arc;
-
 use modelmill_identify::diagnose::{DiagnosisVerdict, IdentifiedEffect};
 use modelmill_spec::{ConstantIdx, DriveKind, ExactExpression, Mechanism, ModelConstant, ModelSymbol};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::progress::SilentProgress;
 
 use super::constants::CONSTANT_ERROR;
 use super::problem::DiagnosisSolution;
@@ -72,7 +69,7 @@ impl NamedZeros {
             mechanism.points[point].at[axis] = ExactExpression::Symbol(ModelSymbol::Constant(constant));
             zeros.push(zero);
         }
-        let host = model.host().clone().with_progress(Arc::new(SilentProgress));
+        let host = model.host().clone().without_notes();
         let varied = match host.derive(&model.path, loaded) {
             Ok(varied) => varied,
             Err(Error::Cancelled) => return Err(Error::Cancelled),

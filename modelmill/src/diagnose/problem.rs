@@ -12,6 +12,7 @@ use crate::along::drive_rates;
 use crate::error::{Error, Outcome};
 use crate::identify::regression::zero_force_message;
 use crate::model::Model;
+use crate::progress::JobHandle;
 use crate::runs::RecordingDifference;
 use crate::runs::payload::PayloadColumns;
 use crate::segment::RecordingSegment;
@@ -182,13 +183,16 @@ pub(crate) fn find_missing_effects(
         grids: &made.grids,
         model,
         all: &all,
+        job: None,
     };
     let are_changes_searched = problem.searches_changes();
     let forces = (problem.measured.clone(), problem.removed.clone());
     let known = problem.candidates.len();
     let search = |problem: &mut DiagnosisProblem| {
         let host = model.host();
-        host.run_job("searching for missing effects", 0, |_| diagnose(problem, &supply))
+        host.run_job("searching for missing effects", 0, |job| {
+            diagnose(problem, &supply.with_job(job))
+        })
     };
     let mut diagnosis = search(&mut problem)?;
     // The audit knows neither changes in time, nor delays and other effects that the search finds: they look like
@@ -362,9 +366,25 @@ struct ColumnSupply<'a> {
     model: &'a Model,
     /// Fitted recordings, then validation runs.
     all: &'a SegmentList<'a>,
+    /// The job of the search, which may be cancelled.
+    job: Option<&'a JobHandle>,
+}
+
+impl<'a> ColumnSupply<'a> {
+    /// The same for a search that the job can cancel.
+    fn with_job(&self, job: &'a JobHandle) -> ColumnSupply<'a> {
+        ColumnSupply {
+            job: Some(job),
+            ..*self
+        }
+    }
 }
 
 impl ColumnProvider for ColumnSupply<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.job.is_some_and(JobHandle::is_cancelled)
+    }
+
     fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>> {
         // Candidates without an entry have no searched constant.
         let (k, felt) = self.origins.get(candidate)?.as_ref()?;

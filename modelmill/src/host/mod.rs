@@ -12,7 +12,7 @@ use modelmill_spec::edit::{EditFailure, EditedModel, NewEffect, add_to_model};
 use modelmill_spec::{EffectKind, LoadedModel};
 
 use crate::error::{Error, Outcome};
-use crate::progress::{JobHandle, ProgressListener, SilentProgress, run_job};
+use crate::progress::{JobHandle, ProgressListener, ProgressWithoutNotes, SilentProgress, run_job};
 
 /// Reads files, provides libraries of effects, and passes progress and notes to a listener. The built-in library of
 /// effects is always available.
@@ -107,8 +107,15 @@ impl Host {
         self
     }
 
-    /// The host with a time limit, counted from this call: all jobs fail with [`Error::Cancelled`] once it is over. Jobs
-    /// that count their steps end at the next step, others at their end.
+    /// The host whose listener receives jobs and no notes, for a model whose notes would repeat those of another one.
+    #[must_use]
+    pub fn without_notes(mut self) -> Self {
+        self.progress = Arc::new(ProgressWithoutNotes(self.progress));
+        self
+    }
+
+    /// The host with a time limit, counted from this call: all jobs fail with [`Error::Cancelled`] once it is over.
+    /// Derivations, searches and jobs that count their steps end at the next step, others at their end.
     ///
     /// ```
     /// use std::time::Duration;

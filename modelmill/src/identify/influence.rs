@@ -7,6 +7,7 @@ use super::options::EstimatorOptions;
 use super::regression::{self, RegressionEstimate};
 use super::standstill;
 use super::thresholds::FAULT_INFLUENCE_LEAST_SIGMAS;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::segment::RecordingSegment;
@@ -14,12 +15,14 @@ use crate::text::table::{number, significant};
 
 /// The note on the base parameter that the faults change most, in its standard deviations; `None` if no fault was
 /// repaired, or the fit without repair fails.
+///
+/// Fails when the job is cancelled.
 pub(super) fn fault_influence(
     model: &Model,
     recordings: &[&PreparedRecording],
     found: &RegressionEstimate,
     options: &EstimatorOptions,
-) -> Option<RecordingNote> {
+) -> Outcome<Option<RecordingNote>> {
     // Recordings with repaired faults are replaced by their faulty versions, the others are kept.
     let mut files = Vec::new();
     let mut data: Vec<RecordingSegment> = Vec::new();
@@ -33,14 +36,20 @@ pub(super) fn fault_influence(
         }
     }
     if files.is_empty() {
-        return None;
+        return Ok(None);
     }
     // The comparison uses the same equations as the fit.
-    if let Some(part) = options.standstill {
-        standstill::exclude_standstill(model, &mut data, part).ok()?;
+    if let Some(part) = options.standstill
+        && standstill::exclude_standstill(model, &mut data, part).is_err()
+    {
+        return Ok(None);
     }
     // The second fit uses the same options, on the unrepaired recordings.
-    let faulty = regression::identify(model, &data, &[], options).ok()?;
+    let faulty = match regression::identify(model, &data, &[], options) {
+        Ok(faulty) => faulty,
+        Err(Error::Cancelled) => return Err(Error::Cancelled),
+        Err(_) => return Ok(None),
+    };
     let infos = model.parameter_infos();
     // The change of each parameter is measured in its standard deviations.
     let pairs = found.solution.values.iter().zip(&faulty.solution.values);
@@ -53,7 +62,9 @@ pub(super) fn fault_influence(
         let deviations = |((a, b), std): &((&f64, &f64), &f64)| (**b - **a).abs() / **std;
         deviations(one).total_cmp(&deviations(other))
     });
-    let (((intact, faulty), std), k) = most?;
+    let Some((((intact, faulty), std), k)) = most else {
+        return Ok(None);
+    };
     let deviations = (faulty - intact).abs() / std;
     let files = files.join(", ");
     // A change below one standard deviation needs no name.
@@ -73,5 +84,5 @@ pub(super) fn fault_influence(
             significant(deviations, 3)
         )
     };
-    Some(RecordingNote::info(says))
+    Ok(Some(RecordingNote::info(says)))
 }

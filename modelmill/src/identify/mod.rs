@@ -115,11 +115,18 @@ impl Model {
         };
         let mut found = identify(self, &fit, &instruments, &check, &options)?;
         found.suspect = compare::first_suspect(recordings).or_else(|| compare::first_suspect(validations));
-        found.by_rate = compare::residual_dependences(self, &fit, &found.values())?;
         // The influence of faults costs a second fit, which instruments do not support.
-        if instruments.is_empty()
-            && let Some(note) = influence::fault_influence(self, recordings, &found.found, &options)
-        {
+        let (by_rate, influence) = self.host().run_job("examining the residuals", 0, |_| {
+            let by_rate = compare::residual_dependences(self, &fit, &found.values());
+            let influence = if instruments.is_empty() {
+                influence::fault_influence(self, recordings, &found.found, &options)
+            } else {
+                Ok(None)
+            };
+            (by_rate, influence)
+        })?;
+        found.by_rate = by_rate?;
+        if let Some(note) = influence? {
             found.fit.data.push(note.clone());
             found.notes.push(note);
         }

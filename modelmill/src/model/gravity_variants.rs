@@ -7,7 +7,6 @@ use modelmill_spec::edit::write_gravity;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::progress::SilentProgress;
 
 /// Vectors of gravity whose models are kept: the axes of the base with both signs. By judgement.
 const MOST_KEPT: usize = 6;
@@ -40,7 +39,7 @@ impl Model {
             same
         } else {
             let text = write_gravity(self.text(), gravity).map_err(Error::input)?;
-            let host = self.host.clone().with_progress(Arc::new(SilentProgress));
+            let host = self.host.clone().without_notes();
             let loaded = host.load_text(Path::new(&self.path), &text)?;
             let derived = host.derive(&self.path, loaded)?;
             let mut known = known();

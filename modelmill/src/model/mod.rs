@@ -17,7 +17,7 @@ use std::sync::Arc;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_codegen::review::base_expression;
-use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, ParameterMonomial};
+use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, ParameterMonomial, StopRequest};
 use modelmill_identify::estimate::ParameterPrior;
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use modelmill_spec::{
@@ -127,8 +127,9 @@ impl Host {
         }
         let mechanism = &loaded.mechanism;
         let derivation = self
-            .run_job(&format!("deriving {}", mechanism.name), 0, |_| {
-                modelmill_codegen::derive(mechanism)
+            .run_job(&format!("deriving {}", mechanism.name), 0, |job| {
+                let is_cancelled = || job.is_cancelled();
+                modelmill_codegen::derive_until(mechanism, StopRequest::new(&is_cancelled))
             })?
             .map_err(|error| Error::derivation(path, error))?;
         // Warnings about the derived model become notes with their line and column in the file.

@@ -93,14 +93,17 @@ impl PreparedRecording {
         if silent.iter().any(|silent| !silent.is_empty()) {
             prepared = Self::prepare_group(model, recordings, Some(&silent), fitted);
         }
-        for (one, silent) in prepared.iter_mut().zip(&silent) {
-            let Ok(one) = one else { continue };
+        for (prepared, silent) in prepared.iter_mut().zip(&silent) {
+            let Ok(one) = prepared else { continue };
             if let Some(first) = one.segments.first_mut() {
                 first.run.notes.extend(silent.iter().map(SilentInterval::note));
                 first.faults.extend(silent.iter().map(SilentInterval::disturbance));
             }
             emit_notes(model, &one.segments);
-            one.examine(model);
+            if let Err(cancelled) = one.examine(model) {
+                *prepared = Err(cancelled);
+                continue;
+            }
             // Events are searched in all forces, so that a push during standstill is found.
             one.sticks.all.leave_out(model, one.sticks.index, &mut one.segments);
         }
@@ -197,10 +200,16 @@ impl PreparedRecording {
     }
 
     /// Looks for faults that make the numbers meaningless; without one also for delays, contacts and pushes.
-    fn examine(&mut self, model: &Model) {
-        let suspect = find_fault(&self.fault_subject(model, &self.segments));
-        let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
-        let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
+    ///
+    /// Fails when the job is cancelled.
+    fn examine(&mut self, model: &Model) -> Outcome {
+        let says = format!("looking for faults of {}", self.file());
+        let (suspect, delays) = model.host().run_job(&says, 0, |_| {
+            let suspect = find_fault(&self.fault_subject(model, &self.segments));
+            let of_segment = |one: &RecordingSegment| ForceDelayAudit::from_segment(model, one);
+            let delays: Vec<Option<ForceDelayAudit>> = self.segments.iter().map(of_segment).collect();
+            (suspect, delays)
+        })?;
         self.delay_gain = delays
             .iter()
             .flatten()
@@ -210,7 +219,7 @@ impl PreparedRecording {
         if let (Some(fault), Some(first)) = (&self.suspect, self.segments.first_mut()) {
             first.note(model, RecordingNote::warning(fault.note_text()));
             first.faults.push(fault.disturbance());
-            return;
+            return Ok(());
         }
         for (one, delays) in self.segments.iter_mut().zip(delays) {
             for note in audit::examine_forces(model, one, delays.as_ref()) {
@@ -218,6 +227,7 @@ impl PreparedRecording {
             }
             audit::examine_events(model, one, self.reading.leave_out_events);
         }
+        Ok(())
     }
 
     /// The recording before its preparation, to be prepared again together with others.

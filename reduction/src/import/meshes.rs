@@ -191,15 +191,10 @@ impl TriangleMesh {
         self
     }
 
-    /// Mass, centre and inertia for a mass in kg, or else for a density in kg/m^3 (kg/m^2 for a shell).
+    /// Volume, centre and inertia. They are computed once for all shapes that are made of the mesh.
     ///
     /// Fails with a phrase if the mesh has no volume, or is open where it must be closed.
-    pub(super) fn inertial(
-        &self,
-        kind: MeshInertia,
-        mass: Option<f64>,
-        density: f64,
-    ) -> Result<DescriptionInertia, String> {
+    pub(super) fn integrals(&self, kind: MeshInertia) -> Result<MeshIntegrals, String> {
         if kind == MeshInertia::Exact && !self.is_closed() {
             return Err("the mesh is not closed, as `inertia=\"exact\"` needs it".to_owned());
         }
@@ -239,16 +234,11 @@ impl TriangleMesh {
             second += share * products / if kind == MeshInertia::Shell { 12.0 } else { 20.0 };
             total += share;
         }
-        // The volume of tetrahedra from the centre of mass, which differs from that before for `Legacy`, is MuJoCo's.
-        let mass = mass.unwrap_or(density * total);
-        let inertia = Matrix3::identity() * second.trace() - second;
-        Ok(DescriptionInertia {
-            mass,
-            at: DescriptionPose {
-                p: centre,
-                r: Matrix3::identity(),
-            },
-            inertia: inertia * (mass / total),
+        Ok(MeshIntegrals {
+            // The volume of tetrahedra from the centre of mass, which differs from that before for `Legacy`, is MuJoCo's.
+            volume: total,
+            centre,
+            inertia: Matrix3::identity() * second.trace() - second,
         })
     }
 
@@ -272,6 +262,32 @@ impl TriangleMesh {
             }
         }
         edges.values().all(|balance| *balance == 0)
+    }
+}
+
+/// Integrals over a mesh with the density 1.
+#[derive(Clone, Debug)]
+pub(super) struct MeshIntegrals {
+    /// Volume, m^3; the area of a shell, m^2.
+    volume: f64,
+    /// Centre, m.
+    centre: Vector3<f64>,
+    /// Inertia about the centre, m^5; of a shell m^4.
+    inertia: Matrix3<f64>,
+}
+
+impl MeshIntegrals {
+    /// Mass, centre and inertia for a mass in kg, or else for a density in kg/m^3 (kg/m^2 for a shell).
+    pub(super) fn inertial(&self, mass: Option<f64>, density: f64) -> DescriptionInertia {
+        let mass = mass.unwrap_or(density * self.volume);
+        DescriptionInertia {
+            mass,
+            at: DescriptionPose {
+                p: self.centre,
+                r: Matrix3::identity(),
+            },
+            inertia: self.inertia * (mass / self.volume),
+        }
     }
 }
 
@@ -329,7 +345,7 @@ mod tests {
     /// The numbers are those of MuJoCo 4.0.0 for the same corners and triangles with 100 kg/m^3.
     #[test]
     fn masses_of_a_letter_are_those_of_mujoco() {
-        let of = |kind| letter().inertial(kind, None, 100.0).unwrap();
+        let of = |kind| letter().integrals(kind).unwrap().inertial(None, 100.0);
         let exact = [208.333_333_333, 170.833_333_333, 45.833_333_333];
         assert_near(&of(MeshInertia::Exact), 200.0, [0.75, 1.25, 0.25], exact);
         let shell = [1_636.538_461_54, 1_323.567_044_35, 433.804_750_52];
@@ -373,7 +389,7 @@ mod tests {
             .flat_map(|corner| corner.iter().map(|x| *x as f32).collect::<Vec<f32>>());
         msh.extend(floats.chain([0.0; 5]).flat_map(f32::to_le_bytes));
         msh.extend(body.triangles.iter().flatten().flat_map(|k| (*k as i32).to_le_bytes()));
-        let want = body.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap();
+        let want = body.integrals(MeshInertia::Exact).unwrap().inertial(Some(3.0), 0.0);
         for mesh in [
             TriangleMesh::read("l.msh", &msh),
             TriangleMesh::read("l.OBJ", obj.as_bytes()),
@@ -381,12 +397,15 @@ mod tests {
         ] {
             let mesh = mesh.unwrap();
             assert_eq!(
-                mesh.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap().inertia,
+                mesh.integrals(MeshInertia::Exact)
+                    .unwrap()
+                    .inertial(Some(3.0), 0.0)
+                    .inertia,
                 want.inertia
             );
             // A mirrored mesh still faces outwards.
             let mirrored = mesh.placed(&DescriptionPose::identity(), [-1.0, 1.0, 1.0]);
-            let found = mirrored.inertial(MeshInertia::Exact, Some(3.0), 0.0).unwrap();
+            let found = mirrored.integrals(MeshInertia::Exact).unwrap().inertial(Some(3.0), 0.0);
             assert!((found.at.p.x + want.at.p.x).abs() + (found.mass - 3.0).abs() < 1e-12);
         }
     }
@@ -414,7 +433,7 @@ mod tests {
         assert!(fault("a.obj", b"v 0 0 0\n").contains("no triangles"));
         let mut open = letter();
         open.triangles.pop();
-        let inertial = |mesh: &TriangleMesh, kind| mesh.inertial(kind, None, 1.0).map(|one| one.mass);
+        let inertial = |mesh: &TriangleMesh, kind| mesh.integrals(kind).map(|one| one.inertial(None, 1.0).mass);
         assert!(inertial(&open, MeshInertia::Exact).unwrap_err().contains("not closed"));
         let mut inside_out = letter();
         inside_out.triangles.iter_mut().for_each(|t| t.swap(1, 2));

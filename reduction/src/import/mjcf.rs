@@ -13,7 +13,7 @@ use super::description::{
 use super::geoms::{self, GIVE_INERTIAL};
 use super::mjcf_compiler::{CompilerSettings, MjcfCompiler};
 use super::mjcf_defaults::MjcfDefaults;
-use super::mjcf_meshes::{LoadedMeshes, MeshFiles};
+use super::mjcf_meshes::{LoadedMeshes, MeshEntries, MeshFiles, mesh_entries};
 use super::mjcf_names::GivenNames;
 use super::mjcf_of_urdf::ATTACHED_REMARK;
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
@@ -39,6 +39,8 @@ pub(super) struct MjcfReader<'a> {
     pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
     /// Reads files of meshes; `None` if the description is not a file.
     pub(super) mesh_files: Option<MeshFiles<'a>>,
+    /// The entries of meshes by their names.
+    pub(super) mesh_entries: MeshEntries<'a>,
     /// Meshes that were read.
     pub(super) loaded_meshes: LoadedMeshes,
 }
@@ -70,6 +72,7 @@ pub(crate) fn read<'a>(document: &'a Document, mesh_files: Option<MeshFiles<'a>>
         mocap_links: Vec::new(),
         sites: Vec::new(),
         mesh_files,
+        mesh_entries: mesh_entries(&root),
         loaded_meshes: LoadedMeshes::new(),
     };
     // Options: gravity, and forces that the model does not have.

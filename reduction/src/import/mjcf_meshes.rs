@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use nalgebra::Vector3;
-use roxmltree::Node;
+use roxmltree::{Node, NodeId};
 
 use super::description::DescriptionInertia;
 use super::geoms::GIVE_INERTIAL;
-use super::meshes::{MeshInertia, TriangleMesh};
+use super::meshes::{MeshInertia, MeshIntegrals, TriangleMesh};
 use super::mjcf::MjcfReader;
 use super::mjcf_include::{FILE_FOLDER, joined_path};
 use super::placed::{DescriptionPose, rotation_from_quaternion};
@@ -64,11 +64,11 @@ impl MeshFolder {
 /// Meshes that were read, by their names.
 pub(super) type LoadedMeshes = BTreeMap<String, LoadedMesh>;
 
-/// A mesh with the way in which its mass is distributed.
-pub(super) struct LoadedMesh {
-    mesh: TriangleMesh,
-    kind: MeshInertia,
-}
+/// A mesh that was read: what its triangles give for all shapes that are made of it, or a phrase that states its fault.
+pub(super) struct LoadedMesh(Result<MeshIntegrals, String>);
+
+/// The entries of meshes in `<asset>`, by their names.
+pub(super) type MeshEntries<'a> = BTreeMap<&'a str, NodeId>;
 
 impl<'a> MjcfReader<'a> {
     /// Mass, centre and inertia of a shape that is a mesh, in the axes of the shape.
@@ -82,14 +82,15 @@ impl<'a> MjcfReader<'a> {
         density: f64,
     ) -> Result<DescriptionInertia, String> {
         if !self.loaded_meshes.contains_key(name) {
-            let entry = find_mesh(geom, name)
-                .ok_or_else(|| located_message(geom, &format!("there is no mesh `{name}` in <asset>")))?;
+            let entry = self.mesh_entries.get(name).and_then(|id| geom.document().get_node(*id));
+            let entry = entry.ok_or_else(|| located_message(geom, &format!("there is no mesh `{name}` in <asset>")))?;
             let loaded = self.load_mesh(&entry)?;
             self.loaded_meshes.insert(name.to_owned(), loaded);
         }
-        let LoadedMesh { mesh, kind } = &self.loaded_meshes[name];
-        mesh.inertial(*kind, mass, density)
-            .map_err(|fault| located_message(geom, &format!("mesh `{name}`: {fault}")))
+        match &self.loaded_meshes[name].0 {
+            Ok(integrals) => Ok(integrals.inertial(mass, density)),
+            Err(fault) => Err(located_message(geom, &format!("mesh `{name}`: {fault}"))),
+        }
     }
 
     /// Reads an entry of `<asset>` with its corners and triangles.
@@ -126,10 +127,7 @@ impl<'a> MjcfReader<'a> {
                 .ok_or_else(|| located_message(entry, "`refquat` has no direction"))?;
         }
         let scale = self.numbers(entry, None, "scale")?.unwrap_or([1.0; 3]);
-        Ok(LoadedMesh {
-            mesh: mesh.placed(&reference, scale),
-            kind,
-        })
+        Ok(LoadedMesh(mesh.placed(&reference, scale).integrals(kind)))
     }
 
     /// Reads the file of a mesh.
@@ -151,15 +149,18 @@ impl<'a> MjcfReader<'a> {
     }
 }
 
-/// The entry of `<asset>` with a name, which is that of its file without its ending if none is given.
-fn find_mesh<'a, 'i>(geom: &Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
-    let root = geom.document().root_element();
+/// The entries of all meshes by their names, which are those of their files without ending if none is given. The first one
+/// of a name counts.
+pub(super) fn mesh_entries<'a>(root: &Node<'a, '_>) -> MeshEntries<'a> {
+    let mut out = MeshEntries::new();
     let assets = root.children().filter(|node| node.has_tag_name("asset"));
-    let mut entries = assets.flat_map(|asset| asset.children().filter(|node| node.has_tag_name("mesh")));
-    entries.find(|entry| {
+    for entry in assets.flat_map(|asset| asset.children().filter(|node| node.has_tag_name("mesh"))) {
         let of_file = || entry.attribute("file").map(name_of_file);
-        entry.attribute("name").or_else(of_file) == Some(name)
-    })
+        if let Some(name) = entry.attribute("name").or_else(of_file) {
+            out.entry(name).or_insert(entry.id());
+        }
+    }
+    out
 }
 
 /// The last part of a path.

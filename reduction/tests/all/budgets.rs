@@ -142,6 +142,38 @@ fn attributes_of_large_default_classes_are_looked_up_in_time() {
     assert!(imported.model.contains("20000"), "{}", imported.model);
 }
 
+/// A mesh is integrated once for all shapes that are made of it, and found by its name without a search. The mass is that of
+/// triangles of 0.5 m^2 with 1000 kg/m^2.
+#[test]
+fn many_shapes_of_meshes_are_computed_in_time() {
+    const N: usize = 15_000;
+    let triangle = "vertex='0 0 0 1 0 0 0 1 0' face='";
+    let large = format!(
+        "<mesh name='large' inertia='shell' {triangle}{}'/>",
+        "0 1 2 ".repeat(4 * N)
+    );
+    let small = (0..N).fold(String::new(), |text, k| {
+        text + &format!("<mesh name='m{k}' inertia='shell' {triangle}0 1 2'/>")
+    });
+    let shapes = (0..N).fold(String::new(), |text, k| {
+        text + &format!("<geom type='mesh' mesh='large' mass='1'/><geom type='mesh' mesh='m{k}'/>")
+    });
+    let text = format!(
+        "<mujoco><asset>{large}{small}</asset><worldbody><body><joint name='j'/>{shapes}</body></worldbody>\
+         <actuator><motor joint='j'/></actuator></mujoco>"
+    );
+    let start = std::time::Instant::now();
+    let imported = import(&text, &ImportOptions::default()).unwrap();
+    // The square of the number took minutes.
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+    let mass = N as f64 * (1.0 + 500.0);
+    assert!(
+        imported.model.contains(&format!("{mass}")),
+        "{mass}: {}",
+        imported.model
+    );
+}
+
 /// Mutated files led here: a system of equations without a row ended the program.
 #[test]
 fn closures_and_joints_of_one_link_are_refused() {

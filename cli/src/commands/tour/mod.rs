@@ -5,9 +5,11 @@
 mod story;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use modelmill::compare::ModelComparison;
 use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
+use modelmill::files::{FileError, FileSource, MemoryFiles, OpenFile, PathKind};
 use modelmill::print::{StepSpelling, edit};
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::page;
@@ -17,7 +19,7 @@ use modelmill_recordings::{BundledRuns, MODELS, PLAIN, WITH_RODS};
 use crate::args::TourArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
 use crate::flags::{CommandLineSpelling, quote_word};
-use crate::output;
+use crate::output::{self, OutputSet};
 use crate::terminal;
 
 use story::TourText;
@@ -36,7 +38,8 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
         .clone()
         .unwrap_or_else(|| std::env::temp_dir().join("modelmill-tour"));
     output::make_folder(&folder)?;
-    let place = TourFolder::unpack(&folder)?;
+    let mut place = TourFolder::new(&folder);
+    let host = &host.clone().with_files(Arc::new(place.files.clone()));
     let mut story = TourText::new(terminal::style());
 
     // Steps 1 to 5: the recording has rods, the model does not.
@@ -50,10 +53,10 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     // Base parameters are estimated, as a user would do with an unknown machine.
     let rods = diagnose(&model, &runs, FixedParameters::Known)?;
     story.diagnose(&place, &seen, &rods);
-    let edited = place.add(&rods, &flags)?;
+    let edited = place.add(&rods, &flags);
     story.add(&place, edited.as_ref());
     story.steps(&rods);
-    place.write(RODS_PAGE, &page(&rods, &flags)?)?;
+    place.add_file(RODS_PAGE, page(&rods, &flags)?);
 
     // Step 6: the model as published, on a recording without rods.
     let model = place.model(host, "spidermill-paper.toml")?;
@@ -61,9 +64,12 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     // Base parameters are fixed: estimated ones would absorb most of the error.
     let paper = diagnose(&model, &runs, FixedParameters::All)?;
     story.paper(&place, &paper);
-    place.write(PAPER_PAGE, &page(&paper, &place.flags(&PLAIN))?)?;
+    let flags = place.flags(&PLAIN);
+    place.add_file(PAPER_PAGE, page(&paper, &flags)?);
 
     story.pages(&place);
+    // Files are written before the text, so that they exist even if standard output is closed.
+    place.outputs.write()?;
     terminal::print(story.text.trim_start())
 }
 
@@ -81,33 +87,66 @@ fn diagnose(
     Ok(model.diagnose(&[fit], &[check], &question)?)
 }
 
-/// The folder of the tour, with its models and recordings.
+/// The folder of the tour, with its models and recordings. They are written together at the end of the tour, and read
+/// from memory until then.
 struct TourFolder {
     /// Its path.
     folder: PathBuf,
+    /// The models and recordings, and the files of the disk.
+    files: TourFiles,
+    /// All files of the folder.
+    outputs: OutputSet,
+}
+
+/// Files of the tour that are not written yet, in front of those of the disk, such as libraries of effects.
+#[derive(Clone, Debug, Default)]
+struct TourFiles(MemoryFiles);
+
+impl TourFiles {
+    /// Where a path is read from.
+    fn source(&self, path: &Path) -> &dyn FileSource {
+        match self.0.kind(path) {
+            PathKind::File => &self.0,
+            _ => output::disk(),
+        }
+    }
+}
+
+impl FileSource for TourFiles {
+    fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+        self.source(path).read(path, most)
+    }
+
+    fn kind(&self, path: &Path) -> PathKind {
+        self.source(path).kind(path)
+    }
+
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        self.source(path).open(path, most)
+    }
 }
 
 impl TourFolder {
-    /// Writes models and recordings of the program into a folder.
-    fn unpack(folder: &Path) -> CommandOutcome<Self> {
-        let place = Self {
+    /// The folder with the models and recordings of the program.
+    fn new(folder: &Path) -> Self {
+        let mut place = Self {
             folder: folder.to_owned(),
+            files: TourFiles::default(),
+            outputs: OutputSet::default(),
         };
         // All bundled models, because some of them include others.
-        for (name, text) in MODELS {
-            place.write(name, text)?;
+        let models = MODELS.iter().map(|(name, text)| (*name, *text));
+        let runs = [&PLAIN, &WITH_RODS].into_iter().flat_map(|runs| [runs.fit, runs.check]);
+        for (name, text) in models.chain(runs) {
+            place.files.0.insert(place.path(name), text);
+            place.add_file(file_name(name), text);
         }
-        for runs in [&PLAIN, &WITH_RODS] {
-            for (name, text) in [runs.fit, runs.check] {
-                place.write(file_name(name), text)?;
-            }
-        }
-        Ok(place)
+        place
     }
 
-    /// Writes a file of the folder.
-    fn write(&self, name: &str, text: &str) -> CommandOutcome {
-        output::write(&self.folder.join(name), text)
+    /// Adds a file to the folder.
+    fn add_file(&mut self, name: &str, text: impl Into<String>) {
+        self.outputs.add_path(self.folder.join(name), text);
     }
 
     /// A file of the folder as an argument of a command, quoted.
@@ -146,17 +185,11 @@ impl TourFolder {
         CommandLineSpelling::new(&[fit], &[check], &RecordingOptions::default())
     }
 
-    /// Writes the model with the effects that were found. Returns the commands that do the same, and the difference of
+    /// Adds the model with the effects that were found. Returns the commands that do the same, and the difference of
     /// the files.
-    fn add(
-        &self,
-        findings: &DiagnosisFindings,
-        flags: &CommandLineSpelling,
-    ) -> CommandOutcome<Option<(Vec<String>, String)>> {
-        let Some(edited) = &findings.edited else {
-            return Ok(None);
-        };
-        self.write(EDITED, &edited.text)?;
+    fn add(&mut self, findings: &DiagnosisFindings, flags: &CommandLineSpelling) -> Option<(Vec<String>, String)> {
+        let edited = findings.edited.as_ref()?;
+        self.add_file(EDITED, edited.text.as_str());
         let model = &findings.before.model;
         // The bundled recordings show one effect, and the tour keeps the given model file.
         let target = format!(" --out {}", self.name(EDITED));
@@ -167,7 +200,7 @@ impl TourFolder {
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::colour_diff(&difference, terminal::style());
-        Ok(Some((commands, coloured)))
+        Some((commands, coloured))
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use serde_json::Value;
 
@@ -22,13 +22,45 @@ pub(crate) struct Workbench {
 impl Workbench {
     #[track_caller]
     pub(crate) fn open(name: &str, model: &str, recordings: &[&str]) -> Self {
+        Self::open_as(name, model, |path| {
+            let mut command = modelmill(&["work", path, "--json"]);
+            command.args(recordings);
+            command
+        })
+    }
+
+    /// The same with variables of the environment.
+    #[track_caller]
+    pub(crate) fn open_with(name: &str, model: &str, variables: &[(&str, String)]) -> Self {
+        Self::open_as(name, model, |path| {
+            let mut command = modelmill(&["work", path, "--json"]);
+            command.envs(variables.iter().map(|(name, value)| (name, value)));
+            command
+        })
+    }
+
+    /// The same with at most this number of open files.
+    #[track_caller]
+    pub(crate) fn open_limited(name: &str, model: &str, most_files: u32) -> Self {
+        Self::open_as(name, model, |path| {
+            let program = modelmill(&[]).get_program().to_owned();
+            let mut command = Command::new("sh");
+            command.args(["-c", &format!("ulimit -n {most_files} && exec \"$0\" \"$@\"")]);
+            command.arg(program).args(["work", path, "--json"]);
+            command
+        })
+    }
+
+    /// A workbench that the command starts for the path of the model.
+    #[track_caller]
+    fn open_as(name: &str, model: &str, command: impl FnOnce(&str) -> Command) -> Self {
         let folder = PathBuf::from(scratch(name));
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).expect("a folder");
         let file = folder.join(model);
         std::fs::copy(super::model(model), &file).expect("a copy");
         let path = file.to_str().expect("plain text");
-        let (child, link, port, token) = Self::served(path, recordings);
+        let (child, link, port, token) = Self::served(command(path));
         Self {
             port,
             token,
@@ -41,17 +73,13 @@ impl Workbench {
     /// Opens the same file once more, after the program has ended.
     pub(crate) fn again(&mut self) {
         let path = self.path().to_owned();
-        (self.child, self.link, self.port, self.token) = Self::served(&path, &[]);
+        (self.child, self.link, self.port, self.token) = Self::served(modelmill(&["work", &path, "--json"]));
     }
 
     /// The program with its link, port and token.
     #[track_caller]
-    fn served(path: &str, recordings: &[&str]) -> (Child, String, u16, String) {
-        let mut child = modelmill(&["work", path, "--json"])
-            .args(recordings)
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
+    fn served(mut command: Command) -> (Child, String, u16, String) {
+        let mut child = command.stdout(Stdio::piped()).spawn().expect("the program starts");
         let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
         let mut told = String::new();
         while !told.contains('}') {
