@@ -2,7 +2,7 @@
 
 use super::SetResidual;
 use super::bench::{EffectSelector, SelectedEffect};
-use super::in_time::time_residual;
+use super::in_time::squares_in_time;
 use super::pool::FitScope;
 use super::problem::CandidateNature;
 use super::thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LARGE_RESIDUAL_SHARE};
@@ -19,6 +19,7 @@ impl EffectSelector<'_> {
     ) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
             let left = self.set_residual(&picks);
+            let squares_in_time = self.squares_in_time(&picks, &left);
             // Find the member whose gain is smallest relative to the unexplained squares on its channels.
             let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
@@ -33,14 +34,9 @@ impl EffectSelector<'_> {
                         0.0
                     }
                 };
-                let in_time: Vec<f64> = if self.varies_in_time(&picks[i]) {
-                    (0..left.residual.len())
-                        .map(|d| self.squares_in_time(d, &left))
-                        .collect()
-                } else {
-                    vec![0.0; left.residual.len()]
-                };
-                let is_in_time = channels.iter().any(|d| in_time[*d] > 0.0);
+                let varies = self.varies_in_time(&picks[i]);
+                let in_time = |d: usize| if varies { squares_in_time[d] } else { 0.0 };
+                let is_in_time = channels.iter().any(|d| in_time(*d) > 0.0);
                 let large: Option<Vec<f64>> = channels.iter().map(|d| self.large_squares(*d, &left)).collect();
                 if !is_in_time && large.is_none() && channels.iter().all(|d| repeatable(*d) <= 0.0) {
                     continue;
@@ -59,7 +55,7 @@ impl EffectSelector<'_> {
                     _ => f64::INFINITY,
                 };
                 let of_repeatable = compared(weighted(&repeatable));
-                let of_time = compared(weighted(&|d| in_time[d]));
+                let of_time = compared(weighted(&in_time));
                 // Where all residuals are large, one channel on which the member explains more is enough.
                 let of_large = large.map_or(f64::INFINITY, |large| {
                     let shares = channels.iter().zip(&large).map(|(d, stays)| gain(*d) / stays);
@@ -83,14 +79,19 @@ impl EffectSelector<'_> {
         candidate.is_per_run && candidate.nature != CandidateNature::Effect
     }
 
-    /// The squares of a channel that follow the time only and cannot be noise.
-    fn squares_in_time(&self, channel: usize, left: &SetResidual) -> f64 {
-        let rest = &left.residual[channel];
-        let again = left.repeatable_share[channel];
-        time_residual(self.problem, channel, rest, again).map_or(0.0, |found| {
-            let noise = found.noise.powi(2) * rest.len() as f64;
-            ((1.0 - again) * dot(rest, rest) - noise).max(0.0)
-        })
+    /// The squares of each channel that follow the time only and cannot be noise, `[channel]`; zeros if no member is compared
+    /// with them.
+    fn squares_in_time(&self, picks: &[SelectedEffect], left: &SetResidual) -> Vec<f64> {
+        let is_compared = picks.iter().any(|pick| self.varies_in_time(pick));
+        let residuals = left.residual.iter().zip(&left.repeatable_share).enumerate();
+        let squares = |(d, (rest, again)): (usize, (&Vec<f64>, &f64))| {
+            if is_compared {
+                squares_in_time(self.problem, d, rest, *again)
+            } else {
+                0.0
+            }
+        };
+        residuals.map(squares).collect()
     }
 
     /// The squares of a channel beyond its noise if they are a large part of those of the force; `None` otherwise.

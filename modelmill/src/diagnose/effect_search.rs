@@ -1,6 +1,8 @@
 //! The search for missing effects with all that may repeat it: differences between recordings, wrong constants, and
 //! zeros of the model file. A model with its recordings goes in; the best answer comes out.
 
+use std::collections::BTreeSet;
+
 use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance, IdentifiedEffect};
 
 use crate::error::{Error, Outcome};
@@ -16,13 +18,13 @@ use super::named_zeros::{self, NamedZeros};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::thresholds::{
     CLAIMED_LENGTH_MOST_RESIDUAL, CONSTANT_MOST_RESIDUAL, CONSTANT_SETTLED_SHARE, DIFFERENCE_LEAST_GAIN,
-    UNEXPLAINED_DIFFERENCE_LEAST_GAIN,
 };
 
 /// Most times a search is repeated with the errors of constants that it claims.
 const MOST_CONSTANT_ROUNDS: usize = 3;
 
-/// Most differences between recordings of which each is tested by a search without it.
+/// Most differences between recordings of which each is tested by a search without it: the weakest ones. By judgement, for the
+/// time that the searches take.
 const MOST_DIFFERENCES_TRIED: usize = 12;
 
 /// Disturbances that may stand in place of a difference between recordings: each recording has parameters of its own.
@@ -50,7 +52,11 @@ pub(super) fn search_effects(
     if !between.is_empty() {
         // A missing effect may look like a difference between recordings.
         let without = search.find(&[], None)?;
-        if are_differences_needed(model, between, &answer, &without) {
+        let least_gain = match between[..] {
+            [_] => search.least_gain(&between[0], &answer),
+            _ => DIFFERENCE_LEAST_GAIN,
+        };
+        if are_differences_needed(model, between, &answer, &without, least_gain) {
             answer = search.drop_needless_differences(between, answer)?;
         } else {
             answer = without;
@@ -76,8 +82,8 @@ pub(super) fn search_effects(
     })
 }
 
-/// Whether the search with differences between recordings explains more than that without them, at the drives on which
-/// the differences act.
+/// Whether the search with differences between recordings explains more than that without them, at the drives and in the
+/// recordings in which the differences act. `least_gain` is the factor by which the squares must rise without them.
 ///
 /// An effect of the machine that the model lacks may look like a difference, so that differences must explain clearly
 /// more. A drift or step in place of a difference has more parameters and must explain clearly more itself.
@@ -86,10 +92,11 @@ fn are_differences_needed(
     between: &[RecordingDifference],
     with: &DiagnosisSolution,
     without: &DiagnosisSolution,
+    least_gain: f64,
 ) -> bool {
     let drives = model.drives();
     let is_concerned = |d: usize| between.iter().any(|one| one.acts_on(d));
-    let further = |one: &&Disturbance| {
+    let is_new = |one: &&Disturbance| {
         with.diagnosis
             .disturbances
             .iter()
@@ -99,27 +106,28 @@ fn are_differences_needed(
         let is_at = |d: usize| is_concerned(d) && one.at.contains(&drives[d]);
         DRIFTS_AND_STEPS.contains(&one.kind.as_str()) && (0..drives.len()).any(is_at)
     };
-    let mut disturbances = without.diagnosis.disturbances.iter().filter(further);
+    let mut disturbances = without.diagnosis.disturbances.iter().filter(is_new);
     let is_known = |effect: &IdentifiedEffect| with.diagnosis.effects.iter().any(|one| one.effect == effect.effect);
     let has_further_effects = !without.diagnosis.effects.iter().all(is_known);
     let least_gain = if !has_further_effects && disturbances.any(is_in_their_place) {
         DIFFERENCE_LEAST_GAIN.recip()
-    } else if with.diagnosis.verdict == DiagnosisVerdict::Unexplained {
-        UNEXPLAINED_DIFFERENCE_LEAST_GAIN
     } else {
-        DIFFERENCE_LEAST_GAIN
+        least_gain
     };
-    // Relative to the same forces in both, in the recordings that differ.
+    // Relative to the same forces in both, in samples that both keep: those that are left out have a residual of 0.
     let samples = acting_samples(between);
-    let sum = |answer: &DiagnosisSolution| -> f64 {
-        let forces = without.diagnosis.budgets.iter().map(|budget| budget.force.powi(2));
-        let residuals = answer.diagnosis.residual.iter();
-        let square = |rest: &Vec<f64>| -> f64 { samples.iter().filter_map(|i| rest.get(*i)).map(|r| r * r).sum() };
-        let parts = residuals.zip(forces).enumerate();
-        let parts = parts.filter(|(d, (_, force))| is_concerned(*d) && *force > 0.0);
-        parts.map(|(_, (rest, force))| square(rest) / force).sum()
-    };
-    sum(without) >= least_gain * sum(with)
+    let (mut sum_with, mut sum_without) = (0.0, 0.0);
+    for (d, budget) in without.diagnosis.budgets.iter().enumerate() {
+        if !is_concerned(d) || budget.force <= 0.0 {
+            continue;
+        }
+        let [of_with, of_without] = [with, without].map(|answer| &answer.diagnosis.residual[d]);
+        for i in samples.iter().filter(|i| of_with[**i] != 0.0 && of_without[**i] != 0.0) {
+            sum_with += (of_with[*i] / budget.force).powi(2);
+            sum_without += (of_without[*i] / budget.force).powi(2);
+        }
+    }
+    sum_without >= least_gain * sum_with
 }
 
 /// Indices of the samples in which differences between recordings act.
@@ -217,7 +225,7 @@ impl EffectSearch<'_> {
         Ok(answer)
     }
 
-    /// Removes the differences between recordings that a search without them does not need, one by one, the smallest first,
+    /// Removes the differences between recordings that a search without them does not need, one by one, the weakest first,
     /// and returns the answer for those that stay. `answer` is the answer with all of them.
     ///
     /// Fails as [`Model::diagnose`] does.
@@ -226,22 +234,50 @@ impl EffectSearch<'_> {
         between: &mut Vec<RecordingDifference>,
         mut answer: DiagnosisSolution,
     ) -> Outcome<DiagnosisSolution> {
-        // One alone was compared with none.
-        if between.len() < 2 || between.len() > MOST_DIFFERENCES_TRIED {
+        // A single one was compared with none.
+        if between.len() < 2 {
             return Ok(answer);
         }
         let forces: Vec<f64> = answer.diagnosis.budgets.iter().map(|budget| budget.force).collect();
-        between.sort_by(|a, b| b.relative_power(&forces).total_cmp(&a.relative_power(&forces)));
-        for k in (0..between.len()).rev() {
+        let powers: Vec<f64> = between.iter().map(|one| one.relative_power(&forces)).collect();
+        let mut weakest: Vec<usize> = (0..between.len()).collect();
+        weakest.sort_by(|a, b| powers[*a].total_cmp(&powers[*b]));
+        weakest.truncate(MOST_DIFFERENCES_TRIED);
+        let mut dropped: Vec<usize> = Vec::new();
+        for original in weakest {
+            // Others stay in their order.
+            let k = original - dropped.iter().filter(|other| **other < original).count();
             let one = between.remove(k);
             let without = self.find(between, None)?;
-            if are_differences_needed(self.model, std::slice::from_ref(&one), &answer, &without) {
+            let least_gain = self.least_gain(&one, &answer);
+            if are_differences_needed(self.model, std::slice::from_ref(&one), &answer, &without, least_gain) {
                 between.insert(k, one);
             } else {
                 answer = without;
+                dropped.push(original);
             }
         }
         Ok(answer)
+    }
+
+    /// The factor by which the squares must rise without a difference. Where a part stays unexplained in the `answer` with it, the
+    /// difference must explain more than that part. A fit without it adapts to it in a fitted recording, and only the
+    /// share (1 - 1/n)^2 of its squares stays in one of n recordings.
+    fn least_gain(&self, one: &RecordingDifference, answer: &DiagnosisSolution) -> f64 {
+        if answer.diagnosis.verdict != DiagnosisVerdict::Unexplained {
+            return DIFFERENCE_LEAST_GAIN;
+        }
+        let fitted: usize = self.data[0].iter().map(|segment| segment.time().len()).sum();
+        let is_fitted = acting_samples(std::slice::from_ref(one))
+            .first()
+            .is_some_and(|i| *i < fitted);
+        let n = self.data[0]
+            .iter()
+            .map(|segment| &segment.run.file)
+            .collect::<BTreeSet<_>>()
+            .len() as f64;
+        let share = if is_fitted { (1.0 - 1.0 / n).powi(2) } else { 1.0 };
+        DIFFERENCE_LEAST_GAIN.max(1.0 + share)
     }
 
     /// The errors of the geometry that explain at least as much as the wrong constants that a search claims in addition

@@ -11,11 +11,6 @@ pub(super) const MOST_VALIDATION_ERROR: f64 = 1.0;
 /// difference only if its mean square residual is smaller by this factor. By judgement.
 pub(super) const DIFFERENCE_LEAST_GAIN: f64 = 1.5;
 
-/// The same where a part of the residual stays unexplained (1): a difference must explain more than what stays, since
-/// something unknown is as likely there. By definition; recordings of a double pendulum of which one seemed to have other
-/// friction and another load.
-pub(super) const UNEXPLAINED_DIFFERENCE_LEAST_GAIN: f64 = 2.0;
-
 /// If this part of the error stays after the last step (1), the verdict quotes the drive whose error falls most
 /// instead of all drives together. By judgement.
 pub(super) const HARDLY_LOWER: f64 = 0.99;

@@ -322,6 +322,37 @@ fn friction_of_another_day_is_no_further_friction() {
     }
 }
 
+/// Each of two differences between recordings is needed by itself. They are tested one by one, and both stay.
+#[test]
+fn two_differences_between_recordings_are_named() {
+    let model = Model::open(bundled(ARM)).expect("the model");
+    let made = [Made::Nothing, Made::Friction(1, 8.0, 10.0), Made::Scale(2, 1.3)];
+    let recordings = made.into_iter().zip(780..).map(|(made, seed)| {
+        let file = run(ARM, seed, made);
+        let recording = model.recording(&file, &RecordingOptions::default());
+        recording.expect("the recording")
+    });
+    let recordings: Vec<_> = recordings.collect();
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::Known,
+        repeat_with_nominal: false,
+    };
+    let all: Vec<_> = recordings.iter().collect();
+    let findings = model.diagnose(&all, &[], &question).expect("an answer");
+    assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+    let disturbances = findings.diagnosis.disturbances.iter();
+    let differences: Vec<_> = disturbances.filter(|one| one.kind == "different_runs").collect();
+    let places: Vec<&[String]> = differences.iter().map(|one| &one.at[..]).collect();
+    assert_eq!(places, [&model.drives()[1..2], &model.drives()[2..3]]);
+    let values =
+        |one: &modelmill::diagnose::Disturbance| -> Vec<f64> { one.estimates.iter().map(|v| v.value).collect() };
+    for (one, truth) in differences.iter().zip([vec![8.0, 10.0], vec![1.3]]) {
+        for (value, truth) in values(one).iter().zip(truth) {
+            assert!((value / truth - 1.0).abs() < 0.1, "{value}, not {truth}");
+        }
+    }
+}
+
 /// Joints whose friction the model describes by one value, while one of them has more: the value of that joint is
 /// missing, and no other law of friction.
 #[test]

@@ -285,6 +285,9 @@ impl AttachedModels<'_> {
             return Err(located_message(node, &says));
         }
         // A body or a frame can be attached alone.
+        if node.attribute("body").is_some() && node.attribute("frame").is_some() {
+            return Err(located_message(node, "it has `body` and `frame`; give one of them"));
+        }
         let (mut part, mut world_body) = (None, None);
         for tag in ["body", "frame"] {
             if let Some(name) = node.attribute(tag) {

@@ -29,8 +29,11 @@ use super::xml_budget::check_xml_budget;
 /// Kinds of elements in the tree of bodies to which tendons, equalities and actuators refer, and tendons.
 const COPIED_KINDS: [&str; 5] = ["body", "joint", "site", "geom", "tendon"];
 
-/// Most steps of searches for names, some seconds. By judgement: published models need less than a hundredth of them.
+/// Most comparisons in searches for names, some seconds. By judgement: published models need less than a hundredth of them.
 const MOST_STEPS: usize = 5_000_000;
+
+/// What is wrong if the copies do not fit into a description.
+const TOO_LARGE: &str = "with these copies the description is too large";
 
 /// The text with copies in place of `<replicate>` and of `<attach>` without a model. Copies stand on the line of the
 /// element that demands them, so that line numbers in messages are those of the file.
@@ -180,7 +183,7 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         self.n_bytes += element.tag.len() + 5 + of_attributes.sum::<usize>();
         self.n_nodes += 1 + element.attributes.len();
         if self.n_bytes > LARGEST_DESCRIPTION || self.n_nodes > MOST_XML_NODES {
-            return Err(located_message(node, "with these copies the description is too large"));
+            return Err(located_message(node, TOO_LARGE));
         }
         self.elements.push(element);
         Ok(self.elements.len() - 1)
@@ -256,6 +259,11 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         let offset = vector(three("offset").transpose()?.unwrap_or_default());
         let original = self.add(node, CopiedElement::new("frame"))?;
         self.add_inside(node, original, (level, ReplicationState::Inside))?;
+        let size = self.elements.len() - original;
+        self.spend_steps(node, size)?;
+        if count.saturating_mul(size) > MOST_XML_NODES {
+            return Err(located_message(node, TOO_LARGE));
+        }
         let names = self.collect_names(original);
         let width = count.to_string().len();
         let (mut copies, mut frames, mut place) = (Vec::new(), Vec::new(), Vector3::zeros());
@@ -320,8 +328,11 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
             self.find_part(WORLD, (tag, name), (None, None))
         };
         let Some(part) = found else {
-            let says =
+            let mut says =
                 format!("there is no {tag} `{name}` before this element, and MuJoCo attaches what stands before it");
+            if node.ancestors().any(|outer| outer.has_tag_name("replicate")) {
+                says += "; what stands inside the same <replicate> cannot be attached here: write its copies out";
+            }
             return Err(located_message(node, &says));
         };
         let mut inner = level.enter();
@@ -470,7 +481,10 @@ impl<'a, 'i> CopiedTree<'_, 'a, 'i> {
         element: usize,
         operation: &mut CopyOperation,
     ) -> Result<Option<Vec<usize>>, String> {
-        self.spend_steps(node, 1)?;
+        let inside = &self.elements[element].inside;
+        let compared = inside.iter().map(|index| 1 + self.elements[*index].attributes.len());
+        let compared = 1 + self.elements[element].attributes.len() + compared.sum::<usize>();
+        self.spend_steps(node, compared)?;
         let is_tendon = node.parent().is_some_and(|section| section.has_tag_name("tendon"));
         let all = std::iter::once(element).chain(self.elements[element].inside.iter().copied());
         let mut references = Vec::new();

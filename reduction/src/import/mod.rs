@@ -187,7 +187,9 @@ fn read_description(text: &str, options: &Options) -> Result<RobotDescription, I
     let text = copied.as_ref();
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
-        let expected = if text.trim_start().starts_with('<') {
+        let expected = if matches!(error, roxmltree::Error::UnknownEntityReference(..)) {
+            "XML with the text of its entities written out"
+        } else if text.trim_start().starts_with('<') {
             "XML with macros (xacro) expanded"
         } else {
             "XML (if the robot has a `robot.yaml`, give the URDF; the yaml next to it is found automatically)"

@@ -4,7 +4,7 @@
 //! - `--` in a comment: comments are emptied.
 //! - Blank lines before the XML declaration: they are moved behind it.
 //! - No space between two attributes: a space is added.
-//! - A `<!DOCTYPE>`: it is emptied, since no entity of it is needed to read a robot.
+//! - A `<!DOCTYPE>`: it is emptied. References to its entities are then refused, as MuJoCo refuses them.
 //! - A prefix that no `xmlns` declares, such as `drake:`: it is declared in the root element. The prefix of macros,
 //!   `xacro:`, is not, because macros must be expanded.
 
@@ -81,8 +81,10 @@ fn doctype_length(text: &str) -> usize {
     let mut is_inside = false;
     let mut at = 0;
     while let Some(c) = text[at..].chars().next() {
-        if quote.is_none() && text[at..].starts_with("<!--") {
-            at = text[at..].find("-->").map_or(text.len(), |k| at + k + "-->".len());
+        let skipped = [("<!--", "-->"), ("<?", "?>")];
+        let skipped = skipped.iter().find(|(start, _)| text[at..].starts_with(start));
+        if let Some((_, end)) = skipped.filter(|_| quote.is_none()) {
+            at = text[at..].find(end).map_or(text.len(), |k| at + k + end.len());
             continue;
         }
         at += c.len_utf8();

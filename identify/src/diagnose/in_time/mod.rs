@@ -28,7 +28,7 @@ use super::thresholds::{
 use products::BlockProducts;
 use profile::{TimeProfile, slow_profiles};
 pub use residual::{ResidualCharacter, TimeResidual, top_speed};
-pub(crate) use residual::{standstill_samples, time_residual};
+pub(crate) use residual::{squares_in_time, standstill_samples, time_residual};
 
 /// The force of a possible change, from the time on at which it begins.
 #[derive(Clone, Debug, PartialEq)]

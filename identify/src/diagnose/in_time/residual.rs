@@ -98,6 +98,17 @@ pub(crate) fn time_residual(
     is_large.then(|| one(ResidualCharacter::Large, variance.sqrt()))
 }
 
+/// The squares of the residual of a channel that follow the time only, beyond the noise; 0 if it can be noise. `again` is the
+/// share that repeats with the state.
+pub(crate) fn squares_in_time(problem: &DiagnosisProblem, channel: usize, rest: &[f64], again: f64) -> f64 {
+    let Some(found) = time_residual(problem, channel, rest, again) else {
+        return 0.0;
+    };
+    let moving = without_standstill(problem, channel, rest);
+    let counted = moving.iter().filter(|r| **r != 0.0).count() as f64;
+    ((1.0 - again) * dot(&moving, &moving) - found.noise.powi(2) * counted).max(0.0)
+}
+
 /// Whether the drive of a channel stands still or nearly so, `[sample]`; empty if its rate is unknown.
 pub(crate) fn standstill_samples(problem: &DiagnosisProblem, channel: usize) -> Vec<bool> {
     let rates = problem.friction.get(3 * channel);
