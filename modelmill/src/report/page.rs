@@ -411,5 +411,5 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
     } else {
         "Equations of the model"
     };
-    format!("<details class=\"embedded\">\n<summary>{what}</summary>\n{inner}</details>\n",)
+    format!("<details class=\"embedded\">\n<summary>{what}</summary>\n{inner}</details>\n")
 }
