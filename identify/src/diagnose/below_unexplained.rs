@@ -5,7 +5,7 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::in_time::squares_in_time;
 use super::pool::FitScope;
 use super::problem::CandidateNature;
-use super::thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LARGE_RESIDUAL_SHARE};
+use super::thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LARGE_RESIDUAL_SHARE, SPOILED_LEAST_RISE};
 use crate::signal::dot;
 
 impl EffectSelector<'_> {
@@ -55,7 +55,13 @@ impl EffectSelector<'_> {
                     _ => f64::INFINITY,
                 };
                 let of_repeatable = compared(weighted(&repeatable));
-                let of_time = compared(weighted(&in_time));
+                let of_time = match compared(weighted(&in_time)) {
+                    // The others were found in its presence.
+                    share if share < EFFECT_LEAST_UNEXPLAINED_RATIO && self.spoils_others(&picks, &fewer) => {
+                        f64::INFINITY
+                    }
+                    share => share,
+                };
                 // Where all residuals are large, one channel on which the member explains more is enough.
                 let of_large = large.map_or(f64::INFINITY, |large| {
                     let shares = channels.iter().zip(&large).map(|(d, stays)| gain(*d) / stays);
@@ -77,6 +83,12 @@ impl EffectSelector<'_> {
     fn varies_in_time(&self, pick: &SelectedEffect) -> bool {
         let candidate = self.candidate(pick);
         candidate.is_per_run && candidate.nature != CandidateNature::Effect
+    }
+
+    /// Whether the error on validation runs, by which the evidence for effects is judged, rises without a member.
+    fn spoils_others(&self, picks: &[SelectedEffect], fewer: &[SelectedEffect]) -> bool {
+        let [with, without] = [picks, fewer].map(|set| self.relative_errors(set, self.has_run_parameters(set)).1);
+        !fewer.is_empty() && without > SPOILED_LEAST_RISE * with
     }
 
     /// The squares of each channel that follow the time only and cannot be noise, `[channel]`; zeros if no member is compared

@@ -201,6 +201,11 @@ pub(super) const EQUALLY_GOOD_DIFFERENCE: f64 = 5.0;
 /// unknown law is as likely there. By definition.
 pub(super) const EFFECT_LEAST_UNEXPLAINED_RATIO: f64 = 1.0;
 
+/// A drift stays in a set with other effects if the error on the validation runs becomes this many times as large without it
+/// (1): the evidence for the others was computed with it. By judgement, from recordings of a double pendulum whose friction
+/// was less likely than not without a drift.
+pub(super) const SPOILED_LEAST_RISE: f64 = 1.25;
+
 /// A residual of this share of the force (1) counts as unexplained even if it is not repeatable. By judgement, from a
 /// pendulum whose measured torque does not follow its motion.
 pub(super) const LARGE_RESIDUAL_SHARE: f64 = 0.5;
