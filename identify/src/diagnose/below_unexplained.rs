@@ -12,7 +12,8 @@ impl EffectSelector<'_> {
     /// Drops members that explain less than what stays unexplained, the weakest first, and returns the set with its
     /// residual: there an unknown law is as likely as the effect. Three rules hold. The gains on all channels are compared with
     /// the repeatable squares. Where all residuals are large, one channel must gain more than the squares that stay there. The
-    /// gain of a drift or of a change in time is compared with the squares that follow the time only.
+    /// gain of a drift or of a change in time is compared with the squares that follow the time only, unless the evidence for
+    /// other effects depends on it.
     pub(super) fn drop_below_unexplained(
         &mut self,
         mut picks: Vec<SelectedEffect>,
@@ -56,7 +57,6 @@ impl EffectSelector<'_> {
                 };
                 let of_repeatable = compared(weighted(&repeatable));
                 let of_time = match compared(weighted(&in_time)) {
-                    // The others were found in its presence.
                     share if share < EFFECT_LEAST_UNEXPLAINED_RATIO && self.spoils_others(&picks, &fewer) => {
                         f64::INFINITY
                     }
@@ -85,25 +85,23 @@ impl EffectSelector<'_> {
         candidate.is_per_run && candidate.nature != CandidateNature::Effect
     }
 
-    /// Whether the error on validation runs, by which the evidence for effects is judged, rises without a member.
+    /// Whether the error on validation runs, by which the evidence for the other effects is judged, clearly rises without a
+    /// member. False if there are no others.
     fn spoils_others(&self, picks: &[SelectedEffect], fewer: &[SelectedEffect]) -> bool {
-        let [with, without] = [picks, fewer].map(|set| self.relative_errors(set, self.has_run_parameters(set)).1);
-        !fewer.is_empty() && without > SPOILED_LEAST_RISE * with
+        let error = |set: &[SelectedEffect]| self.relative_errors(set, self.has_run_parameters(set)).1;
+        !fewer.is_empty() && error(fewer) > SPOILED_LEAST_RISE * error(picks)
     }
 
     /// The squares of each channel that follow the time only and cannot be noise, `[channel]`; zeros if no member is compared
     /// with them.
     fn squares_in_time(&self, picks: &[SelectedEffect], left: &SetResidual) -> Vec<f64> {
-        let is_compared = picks.iter().any(|pick| self.varies_in_time(pick));
+        if !picks.iter().any(|pick| self.varies_in_time(pick)) {
+            return vec![0.0; left.residual.len()];
+        }
         let residuals = left.residual.iter().zip(&left.repeatable_share).enumerate();
-        let squares = |(d, (rest, again)): (usize, (&Vec<f64>, &f64))| {
-            if is_compared {
-                squares_in_time(self.problem, d, rest, *again)
-            } else {
-                0.0
-            }
-        };
-        residuals.map(squares).collect()
+        residuals
+            .map(|(d, (rest, again))| squares_in_time(self.problem, d, rest, *again))
+            .collect()
     }
 
     /// The squares of a channel beyond its noise if they are a large part of those of the force; `None` otherwise.

@@ -127,11 +127,11 @@ impl ExtensionBound<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::column::ForceColumn;
+    use super::super::criterion::criterion;
     use super::super::problem::{
         CandidateEffect, CandidateNature, ColumnChoice, DiagnosisProblem, EffectParameter, LocatedEffect,
         NoColumnProvider, SampleLayout, SampleSegment,
     };
-    use super::super::search::criterion;
     use super::*;
 
     const SAMPLES: u32 = 200;

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 
 use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffect};
+use super::criterion::criterion;
 use super::problem::CandidateNature;
-use super::search::criterion;
 
 /// Number of candidates whose pairs are all tried: those that explain most in addition to the accepted set.
 const PAIRED: usize = 140;

@@ -9,7 +9,7 @@
 //!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
 //!    the model.
 //! 3. `search` - forward search over sets, with exchanges; `combinations` tries pairs and the same kinds at all drives;
-//!    `evidence` decides on time that was not fitted; `simplification`
+//!    `criterion` compares fitted sets; `evidence` decides on time that was not fitted; `simplification`
 //!    makes the last set as small and simple as possible.
 //! 4. `residuals` - what a set leaves; `aliases` - effects that this recording cannot distinguish; `reproducible` - the
 //!    repeatable residual that no candidate explains.
@@ -37,6 +37,7 @@ mod combinations;
 mod conditional;
 mod confirmed_readings;
 mod constant;
+mod criterion;
 mod determined;
 mod disturbance;
 mod drifts;

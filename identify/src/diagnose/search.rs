@@ -4,12 +4,13 @@
 use std::collections::HashSet;
 
 use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffect};
+use super::criterion::criterion;
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
-use super::problem::{ColumnSource, DiagnosisProblem};
+use super::problem::ColumnSource;
 use super::rejection::RejectedCandidate;
 use super::thresholds::{
-    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, REFINEMENT_FEWEST_NUMBERS,
+    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, REFINEMENT_FEWEST_NUMBERS,
     REFINEMENT_LEAST_GAIN, RIVAL_FINER_GAIN_FACTOR, RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE,
     SIMPLER_SET_MOST_LOSS, STEP_MOST_RISE,
 };
@@ -655,32 +656,6 @@ impl EffectSelector<'_> {
         let gone = |pick: &&SelectedEffect| picks.iter().all(|p| p.candidate != pick.candidate);
         accepted.iter().filter(gone).cloned().collect()
     }
-}
-
-/// Information criterion of a set (less is better), with `worth` independent equations. Sets that are physically
-/// impossible come last.
-pub(crate) fn criterion(problem: &DiagnosisProblem, trial: &ScoredEffectSet, worth: f64) -> f64 {
-    let wrong = if trial.is_possible() { 0.0 } else { 1e12 };
-    worth * trial.squares.max(f64::MIN_POSITIVE).ln()
-        + trial.freedoms as f64 * worth.ln().max(1.0)
-        + overlap(problem, &trial.picks)
-        + wrong
-}
-
-/// Small penalty for sets in which one kind acts twice at a place, which a simpler set describes as well, and for many
-/// places.
-fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
-    let effect = |pick: &SelectedEffect| &problem.candidates[pick.candidate].effect;
-    // Number of later effects of the same kind that share a place.
-    let twice = |(i, one): (usize, &SelectedEffect)| {
-        let others = picks[i + 1..].iter().filter(|other| {
-            effect(one).kind == effect(other).kind
-                && effect(one).at.iter().any(|place| effect(other).at.contains(place))
-        });
-        others.count() as f64
-    };
-    let places: usize = picks.iter().map(|pick| effect(pick).at.len()).sum();
-    picks.iter().enumerate().map(twice).sum::<f64>() + PLACE_PRICE * places as f64
 }
 
 /// Members of a set whose candidate is not in another; the complete set if there are none.

@@ -5,9 +5,9 @@
 //! the one with the fewest parameters is taken.
 
 use super::bench::{EffectSelector, SelectedEffect, n_columns};
+use super::criterion::criterion;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, ForceReadingFault, ReadingFaultKind};
-use super::search::criterion;
 use super::thresholds::{EQUALLY_GOOD_DIFFERENCE, EXCHANGE_LEAST_DECREASE};
 
 impl EffectSelector<'_> {

@@ -230,7 +230,6 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     // Errors are compared with this figure.
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
-        // The figure is of all recordings together, so the error of one of them may be larger.
         format!("The forces are noise-free: errors of about {floor} are rounding.")
     } else {
         // Only then a reader asks how an error can be smaller.

@@ -394,6 +394,19 @@ fn what_cannot_be_copied_is_refused_with_its_place() {
     let many = "<replicate count=\"1\"/>".repeat(3000);
     let motors = format!("<actuator>{}</actuator>", "<motor joint=\"k\"/>".repeat(3000));
     assert!(fault(&many, &motors).contains("too many copies and references"));
+    // One element may have many references.
+    let tendon = format!(
+        "<tendon><spatial>{}</spatial></tendon>",
+        "<site site=\"s\"/>".repeat(2000)
+    );
+    assert!(fault(&many, &tendon).contains("too many copies and references"));
+    // `MuJoCo` reads this; the import states what it cannot.
+    let inside = format!(r#"<replicate count="2">{body}<attach body="b" prefix="x_"/></replicate>"#);
+    let found = fault(&inside, "");
+    assert!(
+        found.contains("line 3, <attach>") && found.contains("inside the same <replicate> cannot be attached here"),
+        "{found}"
+    );
     // A part of the same model must not be named as a model.
     let text = main_file(r#"<attach model="own" body="root" prefix="x_"/>"#)
         .replace("<model file=\"rows.xml\"/>", "<model name=\"own\"/>");
