@@ -1,6 +1,6 @@
 //! Everything that crosses the boundary of modelmill: files that are read with a limit and written atomically
 //! ([`files`]), the depth of nested structures in them ([`nesting`]), free text of users on its way to a terminal, a
-//! page or source code, and messages with advice that each front end spells in its own words ([`text`]).
+//! page or source code, and messages with advice that each front end writes in its own words ([`text`]).
 //!
 //! All other crates depend on this one; it knows no models and has no dependencies.
 

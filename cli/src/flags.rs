@@ -1,4 +1,4 @@
-//! Spelling of the library's advice for the command line: options as flags, commands of the program, complete command
+//! Wording of the library's advice for the command line: options as flags, commands of the program, complete command
 //! lines.
 
 use std::borrow::Cow;
@@ -8,15 +8,15 @@ use std::path::PathBuf;
 use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
 use modelmill::options::find_flag;
-use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
+use modelmill::print::{CommandName, OptionName, OptionSetting, RemedyWording, StepWording};
 use modelmill::recording::RecordingOptions;
 use modelmill::text::table::significant;
 use modelmill::{Host, Model};
 
 use crate::args::DiagnosisArgs;
 
-/// Spells command lines that read the same recordings as the current one, for texts that advise a next step.
-pub(crate) struct CommandLineSpelling {
+/// Writes command lines that read the same recordings as the current one, for texts that advise a next step.
+pub(crate) struct CommandLineWording {
     /// Flags `--data` and `--check` of the current command.
     recordings: String,
     /// Flags `--data` and `--map` for `excite`. Empty if the recordings need options that `excite` does not have.
@@ -25,7 +25,7 @@ pub(crate) struct CommandLineSpelling {
     is_completed: bool,
 }
 
-impl CommandLineSpelling {
+impl CommandLineWording {
     /// Recordings for fit and validation, read with the options `reading`.
     pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &RecordingOptions) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> Vec<String> {
@@ -66,23 +66,23 @@ impl CommandLineSpelling {
         Self { is_completed, ..self }
     }
 
-    /// The spelling for the arguments of `diagnose` and `report`.
+    /// The wording for the arguments of `diagnose` and `report`.
     pub(crate) fn from_args(args: &DiagnosisArgs) -> Self {
         Self::new(&args.data, &args.check, &args.preparation.reading())
     }
 }
 
-impl StepSpelling for CommandLineSpelling {
+impl StepWording for CommandLineWording {
     /// `modelmill add ...`, with the libraries of the model.
-    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+    fn format_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut add_command = add_command(&model.path, effect);
         add_command.push_str(&library_flags_of_model(model));
         add_command
     }
 
     /// The same with one more library, which defines the kind.
-    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        let effect = self.spell_effect(model, effect);
+    fn format_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        let effect = self.format_effect(model, effect);
         format!("{effect} --library {}", quote_word(library))
     }
 
@@ -90,16 +90,16 @@ impl StepSpelling for CommandLineSpelling {
         self.is_completed
     }
 
-    fn spell_completion(&self) -> String {
+    fn format_completion(&self) -> String {
         "`modelmill diagnose` with `--out completed.toml` adds all of them in one step".to_owned()
     }
 
-    fn spell_identification(&self, model: &Model) -> String {
+    fn format_identification(&self, model: &Model) -> String {
         format!("{} --out fit.json", self.identification_command(&model.path))
     }
 
     /// `modelmill excite --separate ...` for a motion that distinguishes the effects.
-    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+    fn format_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let mut command = format!(
             "modelmill excite {} --separate {}",
             quote_word(&model.path),
@@ -129,23 +129,23 @@ impl StepSpelling for CommandLineSpelling {
     }
 }
 
-impl RemedySpelling for CommandLineSpelling {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
-        FlagSpelling.spell_options(settings)
+impl RemedyWording for CommandLineWording {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
+        FlagWording.format_options(settings)
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
-        FlagSpelling.spell_command(command)
+    fn format_command(&self, command: CommandName) -> String {
+        FlagWording.format_command(command)
     }
 }
 
 /// Options as flags, and commands of the program.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FlagSpelling;
+pub(crate) struct FlagWording;
 
-impl RemedySpelling for FlagSpelling {
+impl RemedyWording for FlagWording {
     /// Several flags become one piece of a command line in backticks.
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
         let one = |setting: &OptionSetting| match &setting.value {
             None => flag(setting.name),
             Some(value) => format!("{} {}", flag(setting.name), quote_value(value)),
@@ -154,7 +154,7 @@ impl RemedySpelling for FlagSpelling {
         format!("`{}`", all.join(" "))
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
+    fn format_command(&self, command: CommandName) -> String {
         format!("`modelmill {}`", command.name())
     }
 }
@@ -210,7 +210,7 @@ fn library_flags_of_model(model: &Model) -> String {
 pub(crate) fn library_flags(host: &Host) -> String {
     let option = |path: &PathBuf| format!(" --library {}", quote_word(&path.display().to_string()));
     let mut options: String = host.libraries().iter().map(option).collect();
-    if host.is_at_values() {
+    if host.has_numeric_constants() {
         options.push_str(" --at-values");
     }
     options
@@ -255,7 +255,7 @@ mod tests {
             Remedy::command(CommandName::Identify)
         );
         assert_eq!(
-            says.spell(&FlagSpelling),
+            says.format_for(&FlagWording),
             "map it: `--map \"q=q [deg]\" --map \"w=w/2\"`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
         );
     }

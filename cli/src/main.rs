@@ -18,7 +18,7 @@ use modelmill::{Error, Host};
 
 use args::{CommandLine, ProgramCommand};
 use failure::{CommandFailure, CommandOutcome};
-use flags::FlagSpelling;
+use flags::FlagWording;
 use terminal::progress::TerminalProgress;
 use terminal::time_limit::TimeLimit;
 
@@ -42,7 +42,7 @@ fn main() -> ExitCode {
     let host = Host::new()
         .with_files(Arc::new(output::disk().clone()))
         .with_libraries(cli.library)
-        .at_values(cli.at_values)
+        .with_numeric_constants(cli.at_values)
         .with_progress(progress);
     match run(&host, &cli.command) {
         Ok(()) => ExitCode::SUCCESS,
@@ -65,9 +65,9 @@ fn report_failure(failure: &CommandFailure) -> ExitCode {
         CommandFailure::Library(Error::Model(faults)) => {
             // Each fault has its line, what was expected, and a remedy.
             let in_colour = terminal::is_stderr_coloured();
-            terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
+            terminal::print_to_stderr(faults.render_for(in_colour, &FlagWording).trim_end());
         }
-        CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
+        CommandFailure::Library(error) => terminal::error(&error.format_for(&FlagWording)),
         CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
         CommandFailure::NotVerified
         | CommandFailure::ImpossibleValues

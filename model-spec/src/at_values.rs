@@ -76,7 +76,7 @@ impl Mechanism {
             let EffectBodies { parts, lumped_masses } = &mut effect.bodies;
             stands.bodies(parts, lumped_masses);
         }
-        at.is_at_values = true;
+        at.has_numeric_constants = true;
         at
     }
 }

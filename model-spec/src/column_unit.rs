@@ -73,8 +73,8 @@ pub fn unit_factor(unit: &str, quantity: ColumnQuantity) -> Option<f64> {
 /// A unit as the tables of units spell it.
 fn usual_spelling(unit: &str) -> String {
     let mut usual = unit.trim().to_owned();
-    for (other, spelling) in SPELLINGS {
-        usual = usual.replace(other, spelling);
+    for (other, wording) in SPELLINGS {
+        usual = usual.replace(other, wording);
     }
     // The power of `rad/s2`.
     if usual.ends_with("/s2") {

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
-use modelmill_boundary::text::{Message, RemedySpelling};
+use modelmill_boundary::text::{Message, RemedyWording};
 
 /// How many diagnostics are kept. A file with more usually has one common cause.
 const MOST_DIAGNOSTICS: usize = 100;
@@ -243,17 +243,17 @@ impl DiagnosticLog {
     }
 }
 
-/// Renders findings one below the other, with the source lines and advice spelled for the reader's front end.
+/// Renders findings one below the other, with the source lines and advice written for the reader's front end.
 pub(crate) fn render(
     diagnostics: &[Diagnostic],
     sources: &SourceFiles,
     color: bool,
-    spelling: &dyn RemedySpelling,
+    wording: &dyn RemedyWording,
 ) -> String {
     let renderer = if color { Renderer::styled() } else { Renderer::plain() }.decor_style(DecorStyle::Ascii);
     let mut text = String::new();
     for diagnostic in diagnostics {
-        text.push_str(&render_one(diagnostic, sources, &renderer, spelling));
+        text.push_str(&render_one(diagnostic, sources, &renderer, wording));
         text.push_str("\n\n");
     }
     text.truncate(text.trim_end().len());
@@ -267,10 +267,10 @@ fn render_one(
     diagnostic: &Diagnostic,
     sources: &SourceFiles,
     renderer: &Renderer,
-    spelling: &dyn RemedySpelling,
+    wording: &dyn RemedyWording,
 ) -> String {
     let help = diagnostic.help.iter();
-    let help: Vec<String> = help.map(|help| help.spell(spelling)).collect();
+    let help: Vec<String> = help.map(|help| help.format_for(wording)).collect();
     let level = match diagnostic.severity {
         DiagnosticSeverity::Error => Level::ERROR,
         DiagnosticSeverity::Warning => Level::WARNING,

@@ -188,12 +188,13 @@ pub struct EffectKind {
     pub constants: Vec<KindConstant>,
     /// How many places it must have; `None` for any number.
     pub places: Option<usize>,
-    /// How the second place moves, if the kind acts at the first place only.
+    /// For a kind that acts at its first place only, but whose force depends on the motion of a second one: which motion of
+    /// the second place enters.
     pub other: Option<OtherMotion>,
     /// One paragraph: what it is, where it comes from, and how the error looks if a model lacks it. May be empty.
     pub explains: String,
     /// Effects it can be confused with, and the experiment that distinguishes them. May be empty.
-    pub doubles: String,
+    pub confused_with: String,
     /// A simpler kind that is a special case of this one.
     pub refines: Option<String>,
     /// True if the model file or a library of the user defines it, false for the program's library.
@@ -207,8 +208,8 @@ pub struct KindParameter {
     pub symbol: String,
     /// The sign that it must have.
     pub sign: Sign,
-    /// Its unit for each kind of load of a place (force, torque, mass, other). Only loads of places where the kind may
-    /// act are included.
+    /// Its unit, by the quantity that the effect adds at a place (force, torque, mass, other). Only quantities of places
+    /// where the effect may act are included.
     pub units: Vec<(PlaceLoad, String)>,
     /// Remark; may be empty.
     pub note: String,
@@ -221,7 +222,7 @@ pub struct KindConstant {
     pub symbol: String,
     /// Default value as text; `None` if the effect must give one.
     pub value: Option<String>,
-    /// Its unit for each kind of load of a place.
+    /// Its unit, by the quantity that the effect adds at a place.
     pub units: Vec<(PlaceLoad, String)>,
     /// How it is found if it is unknown; `None` if it must be known.
     pub search: Option<ConstantSearch>,
@@ -314,7 +315,7 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             })
             .collect(),
         explains: words(&entry.explains),
-        doubles: words(&entry.doubles),
+        confused_with: words(&entry.doubles),
         refines: entry.refines.as_ref().map(|text| text.text.clone()),
         is_own,
     }

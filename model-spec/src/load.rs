@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use modelmill_boundary::files::{DiskFiles, FileError, FileFault, FileSource, normalise_path};
-use modelmill_boundary::text::{LibrarySpelling, RemedySpelling};
+use modelmill_boundary::text::{RemedyWording, RustWording};
 
 use crate::build::build;
 use crate::diagnostic::{self, Diagnostic, DiagnosticLog, SourceFile, SourceFiles, SourceSpan};
@@ -49,15 +49,15 @@ pub(crate) struct FileEntries {
 impl LoadedModel {
     /// The warnings as text with their source lines; empty if there are none.
     pub fn render(&self, color: bool) -> String {
-        self.render_spelled(color, &LibrarySpelling)
+        self.render_for(color, &RustWording)
     }
 
-    /// [`LoadedModel::render`] with advice spelled for the reader's front end.
-    pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
+    /// [`LoadedModel::render`] with advice written for the reader's front end.
+    pub fn render_for(&self, color: bool, wording: &dyn RemedyWording) -> String {
         if self.warnings.is_empty() {
             return String::new();
         }
-        diagnostic::render(&self.warnings, &self.sources, color, spelling)
+        diagnostic::render(&self.warnings, &self.sources, color, wording)
     }
 }
 
@@ -73,12 +73,12 @@ pub struct LoadFailure {
 impl LoadFailure {
     /// The findings as text with their source lines and advice.
     pub fn render(&self, color: bool) -> String {
-        self.render_spelled(color, &LibrarySpelling)
+        self.render_for(color, &RustWording)
     }
 
-    /// [`LoadFailure::render`] with advice spelled for the reader's front end.
-    pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
-        diagnostic::render(&self.diagnostics, &self.sources, color, spelling)
+    /// [`LoadFailure::render`] with advice written for the reader's front end.
+    pub fn render_for(&self, color: bool, wording: &dyn RemedyWording) -> String {
+        diagnostic::render(&self.diagnostics, &self.sources, color, wording)
     }
 }
 

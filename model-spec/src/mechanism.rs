@@ -75,7 +75,7 @@ pub struct Mechanism {
     /// How recordings name their columns: the model's names and theirs.
     pub recording: RecordingColumns,
     /// Whether constants of the file were replaced by their values, see [`Mechanism::with_numeric_constants`].
-    pub is_at_values: bool,
+    pub has_numeric_constants: bool,
 }
 
 /// A known quantity.

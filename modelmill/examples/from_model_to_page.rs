@@ -5,7 +5,7 @@ use std::path::Path;
 
 use modelmill::diagnose::DiagnosisOptions;
 use modelmill::identify::EstimatorOptions;
-use modelmill::print::LibrarySpelling;
+use modelmill::print::RustWording;
 use modelmill::recording::RecordingOptions;
 use modelmill::{Model, Outcome, report};
 
@@ -42,7 +42,7 @@ fn main() -> Outcome {
         Ok(())
     };
     write("spidermill-completed.toml", better.text())?;
-    write("what-the-model-lacks.html", &report::page(&findings, &LibrarySpelling)?)
+    write("what-the-model-lacks.html", &report::page(&findings, &RustWording)?)
 }
 
 /// The error on the validation run relative to the measured forces, per cent.

@@ -107,7 +107,7 @@ impl Model {
         page.marks(".\n\n").picture(&entry.name, &format!("{}.svg", entry.name));
         page.marks("\n\n").text(&entry.summary_text());
         page.marks(".\n\n## Base parameters\n\n| | expression | value | unit |\n|---|---|---:|---|\n");
-        for (base, value) in self.base.iter().zip(&self.nominal) {
+        for (base, value) in self.base.iter().zip(&self.values) {
             page.marks("| ").code(&base.name).marks(" | ").code(&base.expression);
             page.marks(" | ").text(&significant(*value, 6)).marks(" | ");
             page.text(&base.unit).marks(" |\n");

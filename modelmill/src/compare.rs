@@ -135,7 +135,7 @@ pub fn figures_of_rows(
 
 /// An accumulator of errors for the model's drives, without samples yet.
 fn comparison(model: &Model) -> ErrorAccumulator {
-    let drives = model.drives();
+    let drives = model.row_names();
     let units = (0..drives.len()).map(|d| model.force_unit(d).to_owned());
     ErrorAccumulator::new(drives.clone()).with_units(units)
 }
@@ -171,7 +171,7 @@ pub fn error_locations(
     let mut rounding = Vec::new();
     let mut drives = Vec::new();
     // Drives with nothing but rounding are excluded first.
-    for (d, drive) in model.drives().into_iter().enumerate() {
+    for (d, drive) in model.row_names().into_iter().enumerate() {
         if is_rounding(d, measured, forces) {
             rounding.push(drive);
         } else {
@@ -339,7 +339,7 @@ pub(crate) fn residual_dependences(
         .iter()
         .map(|one| along::filter_and_decimate(along::forces(model, one, values)?, one))
         .collect::<Outcome<Vec<_>>>()?;
-    let drives = model.drives().into_iter().enumerate();
+    let drives = model.row_names().into_iter().enumerate();
     let drives: Vec<(usize, String)> = drives.filter(|(d, _)| !is_rounding(*d, &measured, &forces)).collect();
     residuals_by_rate(model, data, &measured, &forces, &drives)
 }

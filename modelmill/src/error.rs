@@ -3,7 +3,7 @@
 use std::fmt;
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{LibrarySpelling, Message, RemedySpelling};
+use modelmill_boundary::text::{Message, RemedyWording, RustWording};
 use modelmill_codegen::DeriveError;
 use modelmill_identify::{FiguresError, FilterError, FitFileError, LeastSquaresError, RecordingError};
 
@@ -63,16 +63,16 @@ impl Error {
         }
     }
 
-    /// The error text, with remedies formatted for the reader: as command-line options, in Python or in Rust.
-    pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
+    /// The error text, with remedies written for the reader: as command-line options, in Python or in Rust.
+    pub fn format_for(&self, wording: &dyn RemedyWording) -> String {
         match self {
-            Self::Model(failure) => failure.render_spelled(false, spelling),
-            other => other.message().spell(spelling),
+            Self::Model(failure) => failure.render_for(false, wording),
+            other => other.message().format_for(wording),
         }
     }
 
-    /// The error as a message whose remedies can be formatted for any reader, with one exception: for an invalid model
-    /// file, the remedies are in the Rust form. [`Error::spell`] has them in every form.
+    /// The error as a message whose remedies can be written for any reader. For an invalid model file they are already
+    /// written for callers of the Rust library; [`Error::format_for`] writes them for any reader.
     pub fn message(&self) -> Message {
         match self {
             Self::Model(failure) => failure.render(false).into(),
@@ -89,9 +89,9 @@ impl Error {
 }
 
 impl fmt::Display for Error {
-    // Without a known reader the remedies are spelled as fields of the library's options.
+    // Without a known reader the remedies are written as fields of the library's options.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.spell(&LibrarySpelling))
+        f.write_str(&self.format_for(&RustWording))
     }
 }
 

@@ -17,7 +17,8 @@ pub struct RecordingEvaluation {
     pub time: Vec<f64>,
     /// Names and values of the columns, N or N m.
     pub columns: Vec<(String, Vec<f64>)>,
-    /// Components that the equations of motion do not determine, since the mechanism is statically indeterminate there.
+    /// Components of joint reactions that the equations of motion do not determine, since the mechanism is statically
+    /// indeterminate there. Empty for forces of drives.
     pub left_out: Vec<String>,
 }
 
@@ -33,7 +34,7 @@ impl Model {
         reading: &RecordingOptions,
         values: &[f64],
     ) -> Outcome<RecordingEvaluation> {
-        let mut found = RecordingEvaluation::new(self.drives(), Vec::new());
+        let mut found = RecordingEvaluation::new(self.row_names(), Vec::new());
         for segment in &recording::read_as_recorded(self, path.as_ref(), reading)? {
             let forces = along::forces(self, segment, values)?;
             found.extend(&segment.time(), along::filter_and_decimate(forces, segment)?);

@@ -5,13 +5,13 @@
 //! The library uses no terminal, no fixed path and no global state. A [`Host`] reads files, provides the libraries of
 //! effects, and passes progress to the caller's listener.
 //!
-//! A physical effect adds forces to those of the bodies, such as friction of a drive or inertia of a rod. A library of
+//! A physical effect, such as friction of a drive or inertia of a rod, adds forces to those of the bodies. A library of
 //! effects defines kinds of effects; one is built in.
 //!
 //! Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. Their recommendations, such
-//! as adding an effect to the model file, are written in the syntax of the caller. A [`print::StepSpelling`] chooses
+//! as adding an effect to the model file, are written in the syntax of the caller. A [`print::StepWording`] chooses
 //! the syntax: commands of the program, Python calls, or words for callers of this Rust library
-//! ([`print::LibrarySpelling`]).
+//! ([`print::RustWording`]).
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
 //! own values.
@@ -26,7 +26,8 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! // Of several linearly dependent regressor columns, one is kept. `retained` is its product (here `m1*dc1`).
+//! // Each regressor column belongs to one product of parameters. Of linearly dependent columns one is kept; `retained` is
+//! // the product of the kept column.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
@@ -130,7 +131,7 @@
 //!
 //! ```
 //! use modelmill::diagnose::DiagnosisOptions;
-//! use modelmill::print::LibrarySpelling;
+//! use modelmill::print::RustWording;
 //! use modelmill::recording::RecordingOptions;
 //! use modelmill::{Model, report};
 //!
@@ -143,7 +144,7 @@
 //!
 //! let better = model.with_added_effects(&findings.entries)?;
 //! assert!(better.text().contains("rod_inertia"));
-//! assert!(report::page(&findings, &LibrarySpelling)?.contains("<h1>"));
+//! assert!(report::page(&findings, &RustWording)?.contains("<h1>"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!

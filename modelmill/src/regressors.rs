@@ -31,7 +31,7 @@ pub(crate) fn regressor_of(
     model: &Model,
     wanted: &dyn Fn(usize) -> bool,
 ) -> Outcome<Vec<ForceColumn>> {
-    let n_drives = model.drives().len();
+    let n_drives = model.row_names().len();
     let mut stacked: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
     // Each segment is filtered alone; a column that is zero up to here has no values yet.
@@ -82,7 +82,7 @@ fn nonzero_columns(
 ) -> Outcome<Vec<Option<Vec<f64>>>> {
     let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
-    let n_drives = model.drives().len().max(1);
+    let n_drives = model.row_names().len().max(1);
     // Columns that are not wanted are neither stored nor tested.
     let mut is_wanted: Vec<bool> = Vec::new();
     one.for_each_block(model, |states| {

@@ -158,7 +158,7 @@ impl ModelFunctions {
     ///
     /// Fails when the function cannot be derived.
     pub fn shape(&self, function: ModelFunction) -> Outcome<[usize; 2]> {
-        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.row_names().len());
         Ok(match function {
             ModelFunction::InverseDynamics => [drives, 1],
             ModelFunction::Regressor => [drives, self.model.base.len()],
@@ -343,7 +343,7 @@ impl ModelFunctions {
         function: ModelFunction,
         given: &StateSamples<'a>,
     ) -> Outcome<[Option<StateMatrix<'a>>; 4]> {
-        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.row_names().len());
         // Effects that depend on the load need forces of the drives for every function.
         let [rates, accelerations, forces] = function.required_inputs();
         let by_load = self.model.load_dependent_effects();

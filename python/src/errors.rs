@@ -7,7 +7,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use serde_json::{Value, json};
 
-use crate::spelling::PythonSpelling;
+use crate::wording::PythonWording;
 
 /// An exception `modelmill.ModelmillError` with a text; `diagnostics` is a list of objects.
 pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
@@ -31,11 +31,11 @@ pub(crate) fn input_error(py: Python<'_>, says: &str) -> PyErr {
 pub(crate) fn library_error(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Model(faults) => {
-            let told = print::faults(faults, &PythonSpelling);
-            let says = faults.render_spelled(false, &PythonSpelling);
+            let told = print::faults(faults, &PythonWording);
+            let says = faults.render_for(false, &PythonWording);
             modelmill_error(py, says.trim_end(), &told["diagnostics"])
         }
         Error::Cancelled => PyKeyboardInterrupt::new_err(error.to_string()),
-        other => input_error(py, &other.spell(&PythonSpelling)),
+        other => input_error(py, &other.format_for(&PythonWording)),
     }
 }

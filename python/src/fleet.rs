@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::errors::input_error;
-use crate::spelling::PythonSpelling;
+use crate::wording::PythonWording;
 
 /// A plan with its model derived.
 #[pyclass(frozen)]
@@ -20,7 +20,7 @@ pub(crate) struct FleetGround {
 
 /// A fault of the library as an exception.
 fn fleet_error(py: Python<'_>, fault: &FleetFault) -> PyErr {
-    input_error(py, &fault.message().spell(&PythonSpelling))
+    input_error(py, &fault.message().format_for(&PythonWording))
 }
 
 /// Makes a plan from reference recordings, as JSON.

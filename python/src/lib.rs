@@ -13,7 +13,7 @@ mod model;
 mod options;
 mod results;
 mod rigs;
-mod spelling;
+mod wording;
 mod states;
 mod work;
 
@@ -33,7 +33,7 @@ mod _core {
     #[pymodule_export]
     use crate::rigs::{PythonSimulation, reduce, simulate};
     #[pymodule_export]
-    use crate::spelling::advised_names;
+    use crate::wording::advised_names;
     #[pymodule_export]
     use crate::states::{at_single, drive_units, forces_along, model_contents};
 }

@@ -25,7 +25,7 @@ use crate::errors::{input_error, library_error};
 use crate::inputs::{PassedRecording, PythonInput, RecordingOrError};
 use crate::options::{self, ExcitationOptions, Keywords, OptionResult};
 use crate::results::{PythonExcitation, PythonRecording, PythonResult, RemarkList, remarks};
-use crate::spelling::PythonSpelling;
+use crate::wording::PythonWording;
 use crate::work::{JobListener, run_blocking, run_interruptible};
 
 /// Largest number of states for which a function is computed in this thread, without a check for interrupts.
@@ -41,7 +41,7 @@ pub(crate) fn new_host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<J
     let listener = Arc::new(JobListener::default());
     let host = Host::new()
         .with_libraries(libraries)
-        .at_values(at_values)
+        .with_numeric_constants(at_values)
         .with_progress(Arc::clone(&listener) as Arc<_>);
     (host, listener)
 }
@@ -148,7 +148,7 @@ impl CoreModel {
         Self {
             functions: Arc::new(model.functions()),
             n_active: model.active_coordinates().len(),
-            n_drives: model.drives().len(),
+            n_drives: model.row_names().len(),
             model,
             listener,
         }
@@ -259,13 +259,13 @@ impl CoreModel {
     /// Names of the drives.
     #[getter]
     fn drives(&self) -> Vec<String> {
-        self.model.drives()
+        self.model.row_names()
     }
 
     /// Nominal values of the base parameters, in SI units.
     #[getter]
     fn nominal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.model.nominal)
+        PyArray1::from_slice(py, &self.model.values)
     }
 
     /// Name, retained product, expression, unit, nominal value, whether that is given.
@@ -279,8 +279,8 @@ impl CoreModel {
                 base.retained.clone(),
                 base.expression.clone(),
                 info.unit,
-                self.model.nominal[k],
-                self.model.has_nominal(k),
+                self.model.values[k],
+                self.model.has_values(k),
             )
         })
         .collect()
@@ -325,8 +325,8 @@ impl CoreModel {
     fn check(&self, py: Python<'_>) -> PyResult<PythonResult> {
         let checked = self.run_interruptible(py, None, || self.model.check())?;
         Ok(PythonResult::new(
-            &checked.json(&PythonSpelling),
-            &checked.text_with_next_step(TerminalStyle::PLAIN, &PythonSpelling),
+            &checked.json(&PythonWording),
+            &checked.text_with_next_step(TerminalStyle::PLAIN, &PythonWording),
             RemarkList::new(),
         ))
     }
@@ -422,8 +422,8 @@ impl CoreModel {
         let data = recordings(&data);
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.compare(&borrow_recordings(&data), &values)?;
-            let text = found.text(name, TerminalStyle::PLAIN, &PythonSpelling);
-            let json = found.json(name, &PythonSpelling)?;
+            let text = found.text(name, TerminalStyle::PLAIN, &PythonWording);
+            let json = found.json(name, &PythonWording)?;
             Ok(PythonResult::new(&json, &text, remarks(&found.notes)))
         })
     }
@@ -456,8 +456,8 @@ impl CoreModel {
             };
             let (data, check) = (borrow_recordings(&data), borrow_recordings(&check));
             let found = self.model.identify_with(&data, &instruments, &check, &estimation)?;
-            let text = found.text(&self.model, TerminalStyle::PLAIN, &PythonSpelling);
-            let json = found.json(&self.model, &PythonSpelling)?;
+            let text = found.text(&self.model, TerminalStyle::PLAIN, &PythonWording);
+            let json = found.json(&self.model, &PythonWording)?;
             let told = PythonResult::new(&json, &text, remarks(&found.notes));
             Ok(told.with_values(found.values()))
         })
@@ -485,15 +485,15 @@ impl CoreModel {
             let found = self
                 .model
                 .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
-            let spelling = PythonSpelling;
-            let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
+            let wording = PythonWording;
+            let text = found.text(TerminalStyle::PLAIN, &wording).join("\n");
             // The model with the effects that were found.
             let better = match found.entries_to_add() {
                 [] => None,
                 entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };
-            Ok(PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
-                .with_page(page(&found, &spelling)?)
+            Ok(PythonResult::new(&found.json(&wording), &text, remarks(&found.notes))
+                .with_page(page(&found, &wording)?)
                 .with_model(better))
         })
     }
@@ -517,10 +517,10 @@ impl CoreModel {
         }
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.runs(all, &what)?;
-            let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
-            let json = found.json(&PythonSpelling);
+            let text = found.text(TerminalStyle::PLAIN, &PythonWording);
+            let json = found.json(&PythonWording);
             let told = PythonResult::new(&json, &text, remarks(&found.notes));
-            Ok(told.with_page(runs_page(&found, &PythonSpelling)))
+            Ok(told.with_page(runs_page(&found, &PythonWording)))
         })
     }
 
@@ -596,7 +596,7 @@ impl CoreModel {
     fn interpret(&self, py: Python<'_>, fit: Option<&str>, name: &str, unknown: Vec<String>) -> PyResult<PythonResult> {
         self.run_interruptible(py, None, || {
             let found = self.model.interpret(&self.fit(fit, name)?, name, &unknown)?;
-            let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
+            let text = found.text(TerminalStyle::PLAIN, &PythonWording);
             Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
         })
     }
@@ -654,7 +654,7 @@ impl CoreModel {
             if !runs[0].is_empty() {
                 let [first, second] = [&runs[0], &runs[1]].map(|runs| borrow_recordings(runs));
                 let variants = VariantComparison::along_recordings(models, [&first, &second])?;
-                object["along"] = variants.json(&PythonSpelling);
+                object["along"] = variants.json(&PythonWording);
                 text = format!("{text}\n\n{}", variants.text(TerminalStyle::PLAIN));
                 notes = remarks(&variants.notes);
             }

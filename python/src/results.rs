@@ -9,19 +9,19 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::model::CoreModel;
-use crate::spelling::PythonSpelling;
+use crate::wording::PythonWording;
 
 /// Remarks, each with severity and text.
 pub(crate) type RemarkList = Vec<(&'static str, String)>;
 
-/// Notes of the library in the spelling of Python.
+/// Notes of the library in the wording of Python.
 pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a RecordingNote>) -> RemarkList {
     let one = |note: &RecordingNote| {
         let severity = match note.severity {
             NoteSeverity::Warning => "warning",
             NoteSeverity::Info => "info",
         };
-        (severity, note.says.spell(&PythonSpelling))
+        (severity, note.says.format_for(&PythonWording))
     };
     notes.into_iter().map(one).collect()
 }
@@ -214,7 +214,7 @@ impl PythonExcitation {
     #[getter]
     fn text(&self) -> String {
         let plain = modelmill::text::style::TerminalStyle::PLAIN;
-        self.found.text(plain, &PythonSpelling)
+        self.found.text(plain, &PythonWording)
     }
 
     /// Remarks, each with severity and text.

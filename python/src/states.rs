@@ -44,7 +44,7 @@ pub(crate) fn at_single<'py>(
         return Ok(None);
     };
     let values = match values.as_ref() {
-        None => Some(model.model.nominal.as_slice()),
+        None => Some(model.model.values.as_slice()),
         given => numbers(given),
     };
     let Some(values) = values else { return Ok(None) };
@@ -109,7 +109,7 @@ pub(crate) fn model_contents(model: &CoreModel) -> ModelContents {
         model.model.path.clone(),
         model.model.text().to_owned(),
         host.libraries().to_vec(),
-        host.is_at_values(),
+        host.has_numeric_constants(),
     )
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_boundary::files::{DiskFiles, FileSource, normalise_path};
-use modelmill_boundary::text::RemedySpelling;
+use modelmill_boundary::text::RemedyWording;
 use modelmill_spec::{
     Diagnostic, DiagnosticSeverity, LoadFailure, SourceFile, SourceFiles, SourceSpan, find_toml_excess,
     read_referenced, read_text,
@@ -32,12 +32,12 @@ pub struct LoadedRig {
 
 impl LoadedRig {
     /// The remarks as text with their source lines and advice.
-    pub fn render_remarks(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
+    pub fn render_remarks(&self, color: bool, wording: &dyn RemedyWording) -> String {
         let found = LoadFailure {
             diagnostics: self.remarks.clone(),
             sources: self.sources.clone(),
         };
-        found.render_spelled(color, spelling)
+        found.render_for(color, wording)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill::excite::ExcitationRequest;
-use modelmill::print::StepSpelling;
+use modelmill::print::StepWording;
 use modelmill::recording::RecordingOptions;
 use serde::Deserialize;
 
@@ -28,7 +28,7 @@ pub struct Options {
 }
 
 /// Commands that the page shows, which do the same as its panes without the workbench.
-pub trait WorkbenchCommands: StepSpelling + Send + Sync {
+pub trait WorkbenchCommands: StepWording + Send + Sync {
     /// The command for a pane; `None` if there is no command line.
     fn step_command(&self, step: WorkbenchStep) -> Option<String>;
 

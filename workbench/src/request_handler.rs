@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use modelmill::diagnose::SeparationProposal;
 use modelmill::edit::NewEffect;
-use modelmill::print::{CommandName, LibrarySpelling, OptionSetting, RemedySpelling, StepSpelling};
+use modelmill::print::{CommandName, OptionSetting, RemedyWording, RustWording, StepWording};
 use modelmill::{Host, Model};
 use serde::Deserialize;
 use serde_json::json;
@@ -86,7 +86,7 @@ impl RequestHandler {
             ..Options::default()
         };
         let memory_store = Arc::new(self.memory_store.clone());
-        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(PageSpelling), memory_store);
+        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(PageWording), memory_store);
         let session = Arc::new(opened.map_err(|error| error.to_string())?);
         let response = session.view();
         self.session = Some(session);
@@ -94,45 +94,43 @@ impl RequestHandler {
     }
 }
 
-/// Spelling of advice for a page without a command line: names of panes if a pane does it, else calls of the library.
-struct PageSpelling;
+/// Wording of advice for a page without a command line: names of panes if a pane does it, else calls of the library.
+struct PageWording;
 
-impl RemedySpelling for PageSpelling {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
-        LibrarySpelling.spell_options(settings)
+impl RemedyWording for PageWording {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
+        RustWording.format_options(settings)
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
+    fn format_command(&self, command: CommandName) -> String {
         match command {
             CommandName::Check => "pane `Mechanism`".to_owned(),
             CommandName::Diagnose => "pane `Diagnosis`".to_owned(),
             CommandName::Excite => "pane `Excitation`".to_owned(),
-            CommandName::Adopt | CommandName::Evaluate | CommandName::Identify => {
-                LibrarySpelling.spell_command(command)
-            }
+            CommandName::Adopt | CommandName::Evaluate | CommandName::Identify => RustWording.format_command(command),
         }
     }
 }
 
-impl StepSpelling for PageSpelling {
-    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        LibrarySpelling.spell_effect(model, effect)
+impl StepWording for PageWording {
+    fn format_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        RustWording.format_effect(model, effect)
     }
 
-    fn spell_completion(&self) -> String {
-        LibrarySpelling.spell_completion()
+    fn format_completion(&self) -> String {
+        RustWording.format_completion()
     }
 
-    fn spell_identification(&self, model: &Model) -> String {
-        LibrarySpelling.spell_identification(model)
+    fn format_identification(&self, model: &Model) -> String {
+        RustWording.format_identification(model)
     }
 
-    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
-        LibrarySpelling.spell_separation(model, separation)
+    fn format_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+        RustWording.format_separation(model, separation)
     }
 }
 
-impl WorkbenchCommands for PageSpelling {
+impl WorkbenchCommands for PageWording {
     fn step_command(&self, _: WorkbenchStep) -> Option<String> {
         None
     }

@@ -43,7 +43,7 @@ pub(crate) struct WorkbenchSession {
     host: Host,
     /// Files of the session and how recordings are read.
     options: Options,
-    /// Spelling of commands and advice.
+    /// Wording of commands and advice.
     commands: Arc<dyn WorkbenchCommands>,
     /// Text, model and diagnosis.
     state: Mutex<SessionState>,
@@ -120,7 +120,7 @@ impl WorkbenchSession {
     ) -> Outcome<Self> {
         let host = Host::new()
             .with_libraries(host.libraries().to_vec())
-            .at_values(host.is_at_values())
+            .with_numeric_constants(host.has_numeric_constants())
             .with_files(surroundings.files());
         let text = read_model_text(&host, &options.model).map_err(Error::input)?;
         let document = EditedDocument::new(text, options.first + 1);
@@ -403,7 +403,7 @@ impl WorkbenchSession {
             let mut view_json = view::errors(&identified, &read, &*self.commands);
             view_json["afresh"] = json!(is_read);
             if with_places {
-                view_json["compared"] = model.compare(&fit, &model.nominal)?.json("nominal", &*self.commands)?;
+                view_json["compared"] = model.compare(&fit, &model.values)?.json("nominal", &*self.commands)?;
             }
             Ok(view_json)
         })()
@@ -436,7 +436,7 @@ impl WorkbenchSession {
         };
         let to_text = |error| self.error_text(&error);
         // Curves of models with different drives cannot be compared.
-        let other = saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
+        let other = saved.filter(|saved| saved.text() != model.text() && saved.row_names() == model.row_names());
         let edited = version(model).map_err(to_text)?;
         Ok(match other.map(version) {
             Some(Ok(saved)) => report::curves(&saved, Some(&edited), ["model as saved", "as edited"]),
@@ -501,7 +501,7 @@ impl WorkbenchSession {
         let (model, _) = self.model()?;
         let [fit, check] = self.recordings(&model).map_err(|e| self.error_text(&e))?;
         let names = model.active_coordinates();
-        let drives = model.drives();
+        let drives = model.row_names();
         let units: Vec<&str> = (0..drives.len()).map(|drive| model.force_unit(drive)).collect();
         let stretches = |all: Vec<PreparedRecording>| -> Vec<RecordingSegment> {
             all.into_iter().flat_map(|one| one.segments).collect()
@@ -528,9 +528,9 @@ impl WorkbenchSession {
         Ok(json!({ "names": names, "drives": drives, "units": units, "shades": ERROR_SHADES, "runs": runs }))
     }
 
-    /// The text of an error, with commands in the spelling of the user.
+    /// The text of an error, with commands in the wording of the user.
     fn error_text(&self, error: &Error) -> String {
-        error.spell(&*self.commands)
+        error.format_for(&*self.commands)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use modelmill::model::ModelChanges;
-use modelmill::print::RemedySpelling;
+use modelmill::print::RemedyWording;
 use modelmill::recording::PreparedRecording;
 use modelmill::variants::VariantComparison;
 use modelmill::{Error, Host, Model, Outcome};
@@ -68,7 +68,7 @@ impl VariantCache {
         &self,
         before: &Model,
         after: &Model,
-        spelling: &dyn RemedySpelling,
+        wording: &dyn RemedyWording,
         read: impl FnOnce() -> Outcome<SessionRecordings>,
         after_read: impl FnOnce() -> Outcome<Arc<SessionRecordings>>,
     ) -> Outcome<Value> {
@@ -81,12 +81,12 @@ impl VariantCache {
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json(spelling))
+            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json(wording))
         })();
         match along {
             Ok(along) => view_json["along"] = along,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) => view_json["refused"] = json!(error.spell(spelling)),
+            Err(error) => view_json["refused"] = json!(error.format_for(wording)),
         }
         Ok(view_json)
     }

@@ -4,7 +4,7 @@ use modelmill::diagnose::DiagnosisFindings;
 use modelmill::excite::limits;
 use modelmill::identify::Identification;
 use modelmill::model::ModelCheck;
-use modelmill::print::{self, RemedySpelling, edit};
+use modelmill::print::{self, RemedyWording, edit};
 use modelmill::recording::PreparedRecording;
 use modelmill::{EffectKind, Error, Model, RecordingNote, report};
 use serde_json::{Value, json};
@@ -12,21 +12,21 @@ use serde_json::{Value, json};
 use crate::options::WorkbenchCommands;
 
 /// View of a derivation: warnings and notes if the text is valid, else its faults with their lines.
-pub(crate) fn derivation_view(found: &Result<Model, Error>, path: &str, spelling: &dyn RemedySpelling) -> Value {
+pub(crate) fn derivation_view(found: &Result<Model, Error>, path: &str, wording: &dyn RemedyWording) -> Value {
     match found {
         Ok(model) => json!({
             "valid": true,
-            "diagnostics": print::warnings(&model.loaded, spelling),
-            "notes": model.notes.iter().chain(&model.nominal_values().notes).map(|note| note.json(spelling)).collect::<Vec<_>>(),
+            "diagnostics": print::warnings(&model.loaded, wording),
+            "notes": model.notes.iter().chain(&model.nominal_values().notes).map(|note| note.json(wording)).collect::<Vec<_>>(),
         }),
-        Err(Error::Model(faults)) => print::faults(faults, spelling),
-        Err(error) => print::refusal(&error.spell(spelling), path),
+        Err(Error::Model(faults)) => print::faults(faults, wording),
+        Err(error) => print::refusal(&error.format_for(wording), path),
     }
 }
 
 /// View of the base parameters with their values and those of the saved model, of coordinates and drives.
 pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
-    let value = |model: &Model, k: usize| model.has_nominal(k).then(|| model.nominal[k]);
+    let value = |model: &Model, k: usize| model.has_values(k).then(|| model.values[k]);
     let base: Vec<Value> = (model.base.iter().enumerate())
         .map(|(k, base)| {
             // Base parameters of two models correspond if their expressions are equal.
@@ -74,7 +74,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
             let limits = position_limits(model, name);
             json!({ "name": name, "angle": is_angle, "nominal": nominal, "limits": limits })
         }).collect::<Vec<_>>(),
-        "drives": model.drives(),
+        "drives": model.row_names(),
     })
 }
 
@@ -94,7 +94,7 @@ fn position_limits(model: &Model, name: &str) -> Option<[f64; 2]> {
 pub(crate) fn errors(
     found: &Identification,
     recordings: &[Vec<PreparedRecording>; 2],
-    spelling: &dyn RemedySpelling,
+    wording: &dyn RemedyWording,
 ) -> Value {
     let remarks = recordings.iter().flatten().flat_map(PreparedRecording::notes);
     let mut notes: Vec<&RecordingNote> = Vec::new();
@@ -107,7 +107,7 @@ pub(crate) fn errors(
         "nominal": { "fit": found.nominal_fit, "check": found.nominal_check },
         "identified": { "fit": found.fit.fit, "check": found.fit.check },
         "samples": found.fit.samples,
-        "notes": notes.iter().map(|note| note.json(spelling)).collect::<Vec<_>>(),
+        "notes": notes.iter().map(|note| note.json(wording)).collect::<Vec<_>>(),
     })
 }
 
@@ -124,7 +124,7 @@ pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCom
         .iter()
         .map(|entry| {
             let mut view_json = edit::effect_json(entry);
-            view_json["command"] = json!(commands.spell_effect(model, entry));
+            view_json["command"] = json!(commands.format_effect(model, entry));
             view_json
         })
         .collect();

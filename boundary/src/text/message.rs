@@ -1,27 +1,27 @@
-//! Messages: plain text with typed remedies in it, which each front end spells in its own words.
+//! Messages: plain text with typed remedies in it, which each front end writes in its own words.
 //!
 //! The library states a remedy as a value (an option, a command, an entry of the model file), so that no program must
 //! find it in a finished sentence. A front end changes remedies only. Names of files and columns and texts of users
 //! are plain text, whatever they contain.
 //!
-//! A message and a remedy have no `Display`. Code that formats one into a text must choose a spelling, or make a
+//! A message and a remedy have no `Display`. Code that formats one into a text must choose a wording, or make a
 //! message of the complete text by [`message!`](crate::message), which keeps remedies.
 
 use std::cell::RefCell;
 use std::fmt::{self, Write as _};
 
-use super::remedy::{LibrarySpelling, Remedy, RemedySpelling};
+use super::remedy::{Remedy, RemedyWording, RustWording};
 use crate::files::FileError;
 
 /// A text for users with typed remedies in it.
 ///
 /// ```
 /// use modelmill_boundary::message;
-/// use modelmill_boundary::text::{LibrarySpelling, OptionName, Remedy};
+/// use modelmill_boundary::text::{RustWording, OptionName, Remedy};
 /// let file = "run.csv";
 /// let map = Remedy::option(OptionName::Columns).with_value("q=angle [deg]");
 /// let text = message!("{file}: check the unit: {}", map);
-/// assert_eq!(text.spell(&LibrarySpelling), "run.csv: check the unit: option `columns` = `q=angle [deg]`");
+/// assert_eq!(text.format_for(&RustWording), "run.csv: check the unit: option `columns` = `q=angle [deg]`");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Message {
@@ -34,7 +34,7 @@ pub struct Message {
 enum MessagePiece {
     /// Text that stays unchanged.
     Text(String),
-    /// A remedy, which each front end spells.
+    /// A remedy, which each front end words for itself.
     Remedy(Remedy),
 }
 
@@ -85,21 +85,21 @@ impl Message {
         all
     }
 
-    /// The text with remedies spelled for the reader's front end.
-    pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
+    /// The text with remedies written for the reader's front end.
+    pub fn format_for(&self, wording: &dyn RemedyWording) -> String {
         let mut text = String::new();
         for piece in &self.pieces {
             match piece {
                 MessagePiece::Text(words) => text.push_str(words),
-                MessagePiece::Remedy(remedy) => text.push_str(&remedy.spell(spelling)),
+                MessagePiece::Remedy(remedy) => text.push_str(&remedy.format_for(wording)),
             }
         }
         text
     }
 
-    /// The text with remedies spelled for the library.
+    /// The text with remedies written for the library.
     pub fn in_library_words(&self) -> String {
-        self.spell(&LibrarySpelling)
+        self.format_for(&RustWording)
     }
 }
 
@@ -252,8 +252,8 @@ mod tests {
 
     struct UpperCase;
 
-    impl RemedySpelling for UpperCase {
-        fn spell_options(&self, settings: &[OptionSetting]) -> String {
+    impl RemedyWording for UpperCase {
+        fn format_options(&self, settings: &[OptionSetting]) -> String {
             let one = |setting: &OptionSetting| {
                 let value = setting.value.as_deref().map(|value| format!("({value})"));
                 setting.name.name().to_uppercase() + &value.unwrap_or_default()
@@ -261,13 +261,13 @@ mod tests {
             settings.iter().map(one).collect::<Vec<_>>().join("+")
         }
 
-        fn spell_command(&self, command: CommandName) -> String {
+        fn format_command(&self, command: CommandName) -> String {
             format!("<{}>", command.name())
         }
     }
 
     #[test]
-    fn remedies_are_spelled_and_the_rest_stays() {
+    fn remedies_are_worded_and_the_rest_stays() {
         let file = "verb `identify`, option `columns`.toml";
         let between = Remedy::option(OptionName::Between).with_value("1,2");
         let identify = Remedy::command(CommandName::Identify);
@@ -279,7 +279,7 @@ mod tests {
             "option `prior`"
         );
         let expected = format!("{file}: give <identify> with BETWEEN(1,2), 0.12 of \"option `prior`\"");
-        assert_eq!(message.spell(&UpperCase), expected);
+        assert_eq!(message.format_for(&UpperCase), expected);
         assert_eq!(
             message.in_library_words(),
             format!("{file}: give verb `identify` with option `between` = `1,2`, 0.12 of \"option `prior`\"")
@@ -292,7 +292,7 @@ mod tests {
         let both = Message::join([prior.clone(), "nothing".into()], " or ");
         let mut says = message!("{{}} {}: {}", &prior, both);
         says.push(".");
-        assert_eq!(says.spell(&UpperCase), "{} PRIOR: PRIOR or nothing.");
+        assert_eq!(says.format_for(&UpperCase), "{} PRIOR: PRIOR or nothing.");
         assert!(!says.is_empty() && message!("").is_empty());
         // Pieces of text side by side are one, so that equal messages are equal.
         assert_eq!(message!("{}b", "a"), Message::from("ab"));
@@ -302,7 +302,7 @@ mod tests {
     fn options_side_by_side_are_one_remedy() {
         let maps = ["q=a", "w=b"].map(|map| OptionSetting::new(OptionName::Columns, map));
         let message = message!("say {}", Remedy::options(maps));
-        assert_eq!(message.spell(&UpperCase), "say COLUMNS(q=a)+COLUMNS(w=b)");
+        assert_eq!(message.format_for(&UpperCase), "say COLUMNS(q=a)+COLUMNS(w=b)");
         assert_eq!(
             message.in_library_words(),
             "say option `columns` = `q=a` option `columns` = `w=b`"

@@ -16,7 +16,7 @@ pub use markdown_text::MarkdownText;
 pub use message::Message;
 #[doc(hidden)]
 pub use message::{MessageArgument, MessageSink, MessageSlot};
-pub use remedy::{CommandName, LibrarySpelling, OptionName, OptionSetting, Remedy, RemedySpelling};
+pub use remedy::{CommandName, OptionName, OptionSetting, Remedy, RemedyWording, RustWording};
 
 /// Text on one line. Line ends and tabs become blanks. Control characters of terminals and of the direction of
 /// writing become the replacement character.

@@ -179,36 +179,36 @@ impl Remedy {
         self
     }
 
-    /// The remedy spelled for the reader's front end.
-    pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
+    /// The remedy written for the reader's front end.
+    pub fn format_for(&self, wording: &dyn RemedyWording) -> String {
         match self {
-            Self::Options(settings) => spelling.spell_options(settings),
-            Self::Command(command) => spelling.spell_command(*command),
-            Self::Edit(entry) => spelling.spell_edit(entry),
+            Self::Options(settings) => wording.format_options(settings),
+            Self::Command(command) => wording.format_command(*command),
+            Self::Edit(entry) => wording.format_edit(entry),
         }
     }
 }
 
 /// How a front end writes remedies: flags and commands of the program, keywords and methods of a notebook.
-pub trait RemedySpelling {
+pub trait RemedyWording {
     /// Writes options that are given together.
-    fn spell_options(&self, settings: &[OptionSetting]) -> String;
+    fn format_options(&self, settings: &[OptionSetting]) -> String;
 
     /// Writes a command.
-    fn spell_command(&self, command: CommandName) -> String;
+    fn format_command(&self, command: CommandName) -> String;
 
     /// Writes an entry of the model file.
-    fn spell_edit(&self, entry: &str) -> String {
+    fn format_edit(&self, entry: &str) -> String {
         format!("`{entry}` in the model file")
     }
 }
 
-/// The spelling for callers of the Rust library `modelmill`.
+/// The wording for callers of the Rust library `modelmill`.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LibrarySpelling;
+pub struct RustWording;
 
-impl RemedySpelling for LibrarySpelling {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+impl RemedyWording for RustWording {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
         let one = |setting: &OptionSetting| {
             let name = setting.name.name();
             match &setting.value {
@@ -219,7 +219,7 @@ impl RemedySpelling for LibrarySpelling {
         settings.iter().map(one).collect::<Vec<_>>().join(" ")
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
+    fn format_command(&self, command: CommandName) -> String {
         format!("verb `{}`", command.name())
     }
 }

@@ -99,8 +99,8 @@ fn is_default<T>(one: &OptionDeclaration<T>, values: &[String]) -> bool {
 
 /// The argument of a declared option.
 fn argument<T: DeclaredOptions>(one: &'static OptionDeclaration<T>) -> Arg {
-    let spell = spell_reference::<T>;
-    let mut help = one.spell_help(&spell);
+    let write_reference = format_reference::<T>;
+    let mut help = one.format_help(&write_reference);
     if let OptionKind::Columns { .. } = one.kind {
         help.push_str("; may be repeated");
     }
@@ -132,7 +132,7 @@ fn argument<T: DeclaredOptions>(one: &'static OptionDeclaration<T>) -> Arg {
         OptionKind::Choice { values } => {
             let possible = values
                 .iter()
-                .map(|value| PossibleValue::new(value.flag).help(value.spell_help(&spell)));
+                .map(|value| PossibleValue::new(value.flag).help(value.format_help(&write_reference)));
             let default = values.first().map(|value| value.flag);
             argument
                 .value_parser(PossibleValuesParser::new(possible))
@@ -142,7 +142,7 @@ fn argument<T: DeclaredOptions>(one: &'static OptionDeclaration<T>) -> Arg {
 }
 
 /// A reference to another option of the list, as a flag with its value.
-fn spell_reference<T: DeclaredOptions>(name: &str, value: Option<&str>) -> String {
+fn format_reference<T: DeclaredOptions>(name: &str, value: Option<&str>) -> String {
     let flag = find_declaration::<T>(name).map_or(name, |one| one.flag);
     match value {
         None => format!("--{flag}"),

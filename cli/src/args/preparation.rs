@@ -7,7 +7,7 @@ use modelmill::Host;
 use modelmill::recording::{RecordingOptions, StandstillRule};
 
 use crate::args::declared::DeclaredArgs;
-use crate::flags::{FlagSpelling, quote_word};
+use crate::flags::{FlagWording, quote_word};
 
 /// How recordings are read and states are prepared.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -65,6 +65,6 @@ fn read_mapping(path: &str) -> Result<MappingFile, String> {
     let columns = Host::new().column_mapping(Path::new(path));
     Ok(MappingFile {
         path: path.to_owned(),
-        columns: columns.map_err(|error| error.spell(&FlagSpelling))?,
+        columns: columns.map_err(|error| error.format_for(&FlagWording))?,
     })
 }

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::args::effects::AddArgs;
 use crate::failure::CommandOutcome;
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
@@ -35,9 +35,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     let edited = host.edit(&path, old, &effect)?;
     let edited = reload_at_target(host, edited, target.as_ref())?;
     if !edited.loaded.warnings.is_empty() {
-        let warnings = edited
-            .loaded
-            .render_spelled(terminal::is_stderr_coloured(), &FlagSpelling);
+        let warnings = edited.loaded.render_for(terminal::is_stderr_coloured(), &FlagWording);
         terminal::print_to_stderr(warnings.trim_end());
     }
     // As in `check`: a valid file can still fail in the derivation.

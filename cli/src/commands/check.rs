@@ -5,7 +5,7 @@ use modelmill::{Error, Host, print};
 
 use crate::args::CheckArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::{commands, terminal};
 
 /// Validates and derives the model, and prints a summary.
@@ -25,7 +25,7 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
         args.drawing.draw(target, &model, None)?;
     }
     if args.json {
-        let mut object = checked.json(&FlagSpelling);
+        let mut object = checked.json(&FlagWording);
         if let Some(servo) = &servo {
             object["servo"] = servo.json();
         }
@@ -38,7 +38,7 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
             terminal::print(&checked.text(terminal::style()))?;
             terminal::print(&servo.text(terminal::style()))?;
         }
-        None => terminal::print(&checked.text_with_next_step(terminal::style(), &FlagSpelling))?,
+        None => terminal::print(&checked.text_with_next_step(terminal::style(), &FlagWording))?,
     }
     require_possible_values(&checked)
 }
@@ -72,8 +72,8 @@ fn print_fault<T>(args: &CheckArgs, outcome: CommandOutcome<T>) -> CommandOutcom
     match outcome {
         Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
             let object = match &fault {
-                Error::Model(faults) => print::faults(faults, &FlagSpelling),
-                fault => print::refusal(&fault.spell(&FlagSpelling), &args.model.display().to_string()),
+                Error::Model(faults) => print::faults(faults, &FlagWording),
+                fault => print::refusal(&fault.format_for(&FlagWording), &args.model.display().to_string()),
             };
             terminal::print_json(&object)?;
             Err(CommandFailure::Library(fault))

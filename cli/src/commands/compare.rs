@@ -4,7 +4,7 @@ use modelmill::Host;
 
 use crate::args::CompareArgs;
 use crate::failure::CommandOutcome;
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::{commands, terminal};
 
 /// Prints error figures and the regions where the error is largest.
@@ -18,13 +18,13 @@ pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     // The name states in the output which values were used.
     let name = args.parameters.name();
     if args.json {
-        let mut object = compared.json(&name, &FlagSpelling)?;
+        let mut object = compared.json(&name, &FlagWording)?;
         if let Some(forward) = &forward {
             object["forward"] = forward.json();
         }
         return terminal::print_json(&object);
     }
-    terminal::print(&compared.text(&name, terminal::style(), &FlagSpelling))?;
+    terminal::print(&compared.text(&name, terminal::style(), &FlagWording))?;
     match &forward {
         Some(forward) => terminal::print(&format!("\n{}", forward.text(terminal::style()))),
         None => Ok(()),

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::args::{DiagnoseArgs, ParameterSource};
 use crate::failure::CommandOutcome;
-use crate::flags::CommandLineSpelling;
+use crate::flags::CommandLineWording;
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
@@ -22,7 +22,7 @@ pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
     {
         host.load_text(target.path(), &given)?;
     }
-    let flags = CommandLineSpelling::from_args(&args.diagnosis);
+    let flags = CommandLineWording::from_args(&args.diagnosis);
     let options = DiagnosisOptions {
         fixed: args.diagnosis.fixed_parameters(),
         ..DiagnosisOptions::default()
@@ -73,7 +73,7 @@ fn write_completed_model(host: &Host, findings: &DiagnosisFindings, target: &Out
 }
 
 /// What was written, and what to do with it.
-fn completion_text(findings: &DiagnosisFindings, path: &Path, flags: &CommandLineSpelling) -> String {
+fn completion_text(findings: &DiagnosisFindings, path: &Path, flags: &CommandLineWording) -> String {
     let path = path.display().to_string();
     let next = flags.identification_command(&path);
     let others: Vec<_> = (findings.effects_without_entry().iter())

@@ -7,7 +7,7 @@ use modelmill::{Host, Model, RecordingNote};
 
 use crate::args::DiffArgs;
 use crate::failure::CommandOutcome;
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::{commands, terminal};
 
 /// Prints the changes between two models, and draws both into one picture if requested.
@@ -26,7 +26,7 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     if args.json {
         let mut object = changes.json(&before, &after);
         if let Some(variants) = variants {
-            object["along"] = variants.json(&FlagSpelling);
+            object["along"] = variants.json(&FlagWording);
         }
         return terminal::print_json(&object);
     }

@@ -9,7 +9,7 @@ use modelmill::text::table::count;
 
 use crate::args::{CriterionArg, ExciteArgs, PeriodArg};
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::output::{OutputFile, OutputSet};
 use crate::{commands, terminal};
 
@@ -34,7 +34,7 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
     if args.json {
         terminal::print_json(&found.json())?;
     } else {
-        terminal::print(&found.text(terminal::style(), &FlagSpelling))?;
+        terminal::print(&found.text(terminal::style(), &FlagWording))?;
     }
     terminal::note(&format!(
         "{}: one period, {}; {} shows it",

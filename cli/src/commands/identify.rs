@@ -9,7 +9,7 @@ use modelmill::{Host, Model};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
@@ -36,7 +36,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     if !model.actuators().is_empty()
         && let Some(found) = identify_from_signals(&model, args, &reading)?
     {
-        let object = found.json(&FlagSpelling);
+        let object = found.json(&FlagWording);
         if let Some(target) = &target {
             target.write(&format!("{object:#}\n"))?;
         }
@@ -72,14 +72,14 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
     let found = model.identify_with(&data, &instruments, &check, &options)?;
     // The file and --json have the same object.
-    let object = found.json(&model, &FlagSpelling)?;
+    let object = found.json(&model, &FlagWording)?;
     if let Some(target) = &target {
         target.write(&format!("{object:#}\n"))?;
     }
     if args.json {
         return terminal::print_json(&object);
     }
-    terminal::print(&found.text(&model, terminal::style(), &FlagSpelling))?;
+    terminal::print(&found.text(&model, terminal::style(), &FlagWording))?;
     if let Some(target) = &target {
         terminal::note(&format!(
             "the fit is in {0}; use it with --parameters {0}",

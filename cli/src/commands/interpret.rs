@@ -5,7 +5,7 @@ use modelmill::Host;
 
 use crate::args::InterpretArgs;
 use crate::failure::CommandOutcome;
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::{commands, terminal};
 
 /// Prints all real solutions, or which of the unknowns are not determined.
@@ -16,5 +16,5 @@ pub(crate) fn run(host: &Host, args: &InterpretArgs) -> CommandOutcome {
     if args.json {
         return terminal::print_json(&found.json());
     }
-    terminal::print(&found.text(terminal::style(), &FlagSpelling))
+    terminal::print(&found.text(terminal::style(), &FlagWording))
 }

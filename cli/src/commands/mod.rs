@@ -42,7 +42,7 @@ use modelmill::{Host, Model};
 
 use crate::args::{DiagnosisArgs, ParameterSource};
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::terminal;
 
 /// Reads and derives a model file; warnings go to standard error.
@@ -63,7 +63,7 @@ pub(crate) fn derive_model(host: &Host, path: &str, loaded: LoadedModel) -> Comm
 pub(crate) fn load(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     let loaded = load_quietly(host, path)?;
     if !loaded.warnings.is_empty() {
-        let text = loaded.render_spelled(terminal::is_stderr_coloured(), &FlagSpelling);
+        let text = loaded.render_for(terminal::is_stderr_coloured(), &FlagWording);
         terminal::print_to_stderr(text.trim_end());
     }
     Ok(loaded)
@@ -79,7 +79,7 @@ pub(crate) fn rig(host: &Host, path: &Path) -> CommandOutcome<LoadedRig> {
 /// Prints the remarks about a rig to standard error.
 pub(crate) fn print_remarks(loaded: &LoadedRig) {
     if !loaded.remarks.is_empty() {
-        let text = loaded.render_remarks(terminal::is_stderr_coloured(), &FlagSpelling);
+        let text = loaded.render_remarks(terminal::is_stderr_coloured(), &FlagWording);
         terminal::print_to_stderr(text.trim_end());
     }
 }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::args::RecordingsArgs;
 use crate::commands;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::terminal;
 
 /// Prints tables and topics with their columns, and the proposed columns for a model.
@@ -38,7 +38,7 @@ pub(crate) fn run(host: &Host, args: &RecordingsArgs) -> CommandOutcome {
         return Err(last.into());
     }
     let errors = unread.iter().map(|(_, error)| error).chain([&last]);
-    let errors: Vec<String> = errors.map(|error| error.spell(&FlagSpelling)).collect();
+    let errors: Vec<String> = errors.map(|error| error.format_for(&FlagWording)).collect();
     Err(CommandFailure::Input(format!(
         "{} of {} recordings cannot be read:\n  {}",
         errors.len(),
@@ -77,7 +77,7 @@ fn print_recordings(args: &RecordingsArgs, found: &[ListedRecording], unread: &[
         });
         let unread = unread
             .iter()
-            .map(|(path, error)| json!({ "file": path.display().to_string(), "says": error.spell(&FlagSpelling) }));
+            .map(|(path, error)| json!({ "file": path.display().to_string(), "says": error.format_for(&FlagWording) }));
         return terminal::print_json(&json!({
             "recordings": objects.collect::<Vec<Value>>(),
             "unread": unread.collect::<Vec<Value>>(),

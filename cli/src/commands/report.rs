@@ -10,7 +10,7 @@ use modelmill::report::page;
 use crate::args::ReportArgs;
 use crate::commands;
 use crate::failure::CommandOutcome;
-use crate::flags::CommandLineSpelling;
+use crate::flags::CommandLineWording;
 use crate::output::{self, OutputFile};
 use crate::terminal;
 
@@ -30,7 +30,7 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
         repeat_with_nominal: false,
     };
     let findings = commands::diagnose(host, &args.diagnosis, question)?;
-    target.write(&page(&findings, &CommandLineSpelling::from_args(&args.diagnosis))?)?;
+    target.write(&page(&findings, &CommandLineWording::from_args(&args.diagnosis))?)?;
     let says = findings.verdict_text();
     terminal::print(&format!(
         "{}\n\nThe page is {}.",

@@ -9,7 +9,7 @@ use modelmill::runs::UnreadRun;
 
 use crate::args::runs::RunsArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
@@ -52,16 +52,16 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     });
     let found = model.runs(recordings, &args.runs_options())?;
     match &written {
-        Some((target, RunsFileFormat::Page)) => target.write(&runs_page(&found, &FlagSpelling))?,
+        Some((target, RunsFileFormat::Page)) => target.write(&runs_page(&found, &FlagWording))?,
         Some((target, RunsFileFormat::Json)) => {
-            target.write(&format!("{:#}\n", found.json(&FlagSpelling)))?;
+            target.write(&format!("{:#}\n", found.json(&FlagWording)))?;
         }
         None => {}
     }
     if args.json {
-        return terminal::print_json(&found.json(&FlagSpelling));
+        return terminal::print_json(&found.json(&FlagWording));
     }
-    terminal::print(&found.text(terminal::style(), &FlagSpelling))?;
+    terminal::print(&found.text(terminal::style(), &FlagWording))?;
     match &written {
         Some((target, _)) => terminal::print(&format!("Written to {}.", target.path().display())),
         None => Ok(()),

@@ -8,7 +8,7 @@ use modelmill::verify::{CheckState, FileFingerprint, FileRole, VerificationLimit
 
 use crate::args::{ParameterSource, VerifyArgs};
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 use crate::output::OutputFile;
 use crate::{commands, output, terminal};
 
@@ -39,15 +39,15 @@ pub(crate) fn run(host: &Host, args: &VerifyArgs) -> CommandOutcome {
         Vec::new()
     };
     if let Some(target) = &junit {
-        target.write(&verified.junit(&FlagSpelling))?;
+        target.write(&verified.junit(&FlagWording))?;
     }
     if args.json {
         let program = program_sha256();
         context.inputs = &inputs;
         context.program_sha256 = program.as_deref();
-        terminal::print_json(&verified.json(&context, &FlagSpelling))?;
+        terminal::print_json(&verified.json(&context, &FlagWording))?;
     } else {
-        terminal::print(&verified.text(&context, terminal::style(), &FlagSpelling))?;
+        terminal::print(&verified.text(&context, terminal::style(), &FlagWording))?;
     }
     match verified.state() {
         CheckState::Pass => Ok(()),

@@ -9,7 +9,7 @@ use std::time::Duration;
 use modelmill::diagnose::SeparationProposal;
 use modelmill::edit::NewEffect;
 use modelmill::files::PathKind;
-use modelmill::print::{CommandName, OptionSetting, RemedySpelling, StepSpelling};
+use modelmill::print::{CommandName, OptionSetting, RemedyWording, StepWording};
 use modelmill::{Host, Model};
 use modelmill_workbench::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep, serve};
 use serde_json::json;
@@ -17,7 +17,7 @@ use serde_json::json;
 use crate::args::work::WorkArgs;
 use crate::commands;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::{CommandLineSpelling, library_flags, quote_word};
+use crate::flags::{CommandLineWording, library_flags, quote_word};
 use crate::terminal;
 
 /// Time before the program states that the derivation goes on.
@@ -58,9 +58,9 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
         port: args.port,
         first: 0,
     };
-    let spelled = WorkbenchAdvice::new(host, args);
+    let advice = WorkbenchAdvice::new(host, args);
     let opening = announce_long_derivation(&args.model);
-    serve(host, options, Arc::new(spelled), |link| {
+    serve(host, options, Arc::new(advice), |link| {
         drop(opening);
         // If standard output is closed, the server continues: a browser that has the link can still use it.
         let _ = if args.json {
@@ -89,10 +89,10 @@ fn announce_long_derivation(model: &Path) -> Sender<()> {
     opening
 }
 
-/// Spells the steps of the workbench as command lines. All fields are quoted for a shell; flags begin with a space.
+/// Writes the steps of the workbench as command lines. All fields are quoted for a shell; flags begin with a space.
 struct WorkbenchAdvice {
-    /// Spelling of the advice of a diagnosis.
-    flags: CommandLineSpelling,
+    /// Wording of the advice of a diagnosis.
+    flags: CommandLineWording,
     /// Path of the model file.
     model: String,
     /// Flags `--data`.
@@ -115,7 +115,7 @@ impl WorkbenchAdvice {
             paths.iter().map(path).collect()
         };
         Self {
-            flags: CommandLineSpelling::new(&args.data, &args.check, &args.preparation.reading()),
+            flags: CommandLineWording::new(&args.data, &args.check, &args.preparation.reading()),
             model: quoted_path(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
@@ -204,35 +204,35 @@ impl WorkbenchCommands for WorkbenchAdvice {
 /// File of the trajectory in the commands that the page shows.
 const TRAJECTORY: &str = "excitation.csv";
 
-impl RemedySpelling for WorkbenchAdvice {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
-        self.flags.spell_options(settings)
+impl RemedyWording for WorkbenchAdvice {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
+        self.flags.format_options(settings)
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
-        self.flags.spell_command(command)
+    fn format_command(&self, command: CommandName) -> String {
+        self.flags.format_command(command)
     }
 }
 
-impl StepSpelling for WorkbenchAdvice {
-    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        self.flags.spell_effect(model, effect)
+impl StepWording for WorkbenchAdvice {
+    fn format_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        self.flags.format_effect(model, effect)
     }
 
-    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        self.flags.spell_effect_of_library(model, effect, library)
+    fn format_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        self.flags.format_effect_of_library(model, effect, library)
     }
 
-    fn spell_completion(&self) -> String {
-        self.flags.spell_completion()
+    fn format_completion(&self) -> String {
+        self.flags.format_completion()
     }
 
-    fn spell_identification(&self, model: &Model) -> String {
-        self.flags.spell_identification(model)
+    fn format_identification(&self, model: &Model) -> String {
+        self.flags.format_identification(model)
     }
 
-    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
-        self.flags.spell_separation(model, separation)
+    fn format_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+        self.flags.format_separation(model, separation)
     }
 }
 
@@ -266,14 +266,14 @@ mod tests {
         let ProgramCommand::Work(args) = &cli.command else {
             panic!("another command");
         };
-        let spelled = WorkbenchAdvice::new(&host, args);
+        let advice = WorkbenchAdvice::new(&host, args);
         let asked = ExcitationSettings {
             harmonics: 3,
             period: 2.5,
             limits: vec!["q=-1:2".to_owned(), "q_d=3".to_owned()],
             ..ExcitationSettings::default()
         };
-        let command = spelled.excite_command(&asked).unwrap();
+        let command = advice.excite_command(&asked).unwrap();
         let excite = CommandLine::try_parse_from(words(&command)).unwrap();
         let ProgramCommand::Excite(excite) = &excite.command else {
             panic!("another command");
@@ -292,7 +292,7 @@ mod tests {
             WorkbenchStep::Identify,
             WorkbenchStep::Diagnose,
         ] {
-            let command = spelled.step_command(step).unwrap();
+            let command = advice.step_command(step).unwrap();
             let cli = CommandLine::try_parse_from(words(&command));
             let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
             assert_eq!(cli.library, [PathBuf::from("my.toml")]);
@@ -304,7 +304,7 @@ mod tests {
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
-        let command = spelled.variant_command(Path::new("before this.toml")).unwrap();
+        let command = advice.variant_command(Path::new("before this.toml")).unwrap();
         let cli = CommandLine::try_parse_from(words(&command));
         let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
         let ProgramCommand::Diff(other) = &cli.command else {

@@ -14,7 +14,7 @@ use modelmill::{NoteSeverity, RecordingNote};
 use modelmill_boundary::text::{self, plain};
 
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 
 /// Whether the user allows colours at all: `NO_COLOR` (no-color.org) and dumb terminals forbid them.
 fn is_colour_allowed() -> bool {
@@ -104,7 +104,7 @@ pub(crate) fn note(text: &str) {
 
 /// A remark of the library on standard error.
 pub(crate) fn remark(note: &RecordingNote) {
-    let says = note.says.spell(&FlagSpelling);
+    let says = note.says.format_for(&FlagWording);
     match note.severity {
         NoteSeverity::Warning => warn(&says),
         NoteSeverity::Info => self::note(&says),

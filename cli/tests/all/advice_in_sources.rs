@@ -1,5 +1,5 @@
-//! Advice in messages of the libraries is data (`Remedy`), which each front end spells in its own way. So no text in
-//! their sources names a flag of the program or spells an option or a command by hand.
+//! Advice in messages of the libraries is data (`Remedy`), which each front end writes in its own way. So no text in
+//! their sources names a flag of the program or writes an option or a command by hand.
 
 use std::path::{Path, PathBuf};
 
@@ -8,8 +8,8 @@ use crate::common::workspace;
 /// Crates whose messages all front ends show.
 const LIBRARIES: [&str; 4] = ["model-spec/src", "identify/src", "reduction/src", "modelmill/src"];
 
-/// The spelling for callers of the library.
-const SPELLING: &str = "modelmill/src/print/spelling.rs";
+/// The wording for callers of the library.
+const SPELLING: &str = "modelmill/src/print/wording.rs";
 
 /// Rust files below a folder.
 fn sources(folder: &Path) -> Vec<PathBuf> {
@@ -26,7 +26,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn no_library_spells_advice_by_hand() {
+fn no_library_writes_advice_by_hand() {
     let mut files = 0;
     let mut faults = Vec::new();
     for path in LIBRARIES.iter().flat_map(|folder| sources(&workspace(folder))) {

@@ -80,6 +80,26 @@ fn an_unexplained_double_pendulum_has_no_differences_between_recordings() {
     assert_eq!(claimed_kinds(&answer), ["outliers", "outliers"]);
 }
 
+/// Compared with the recording of one mode, `runs` named loads, friction that would drive the machine, and a scale of -0.33.
+#[test]
+fn runs_of_an_unexplained_double_pendulum_have_no_causes() {
+    let names = [0, 1, 2, 3, 4].map(|k| format!("trajectory_0{k}.csv"));
+    let Some((folder, runs)) = recordings("double-pendulum", &names.each_ref().map(String::as_str)) else {
+        return;
+    };
+    let model = format!("{folder}/dp_A_full.toml");
+    let mut args = vec!["runs", &model, "--json", "--data"];
+    args.extend(runs.iter().map(String::as_str));
+    let answer = json(&args);
+    assert_eq!(
+        answer["changes"].as_array().map(Vec::len),
+        Some(0),
+        "{}",
+        answer["changes"]
+    );
+    assert_eq!(answer["runs"][1]["verdict"], "different");
+}
+
 /// The torque of this pendulum follows its motion in some recordings only.
 #[test]
 fn a_pendulum_has_what_its_recordings_show() {

@@ -199,7 +199,7 @@ fn relations_along(
         let closed = substitute_relations(graph, relations, residual);
         let tape = EvaluationTape::new(graph, &closed);
         poses.iter().all(|q| is_loop_closed_at(mechanism, &tape, q, size))
-            && (mechanism.is_at_values || motion.is_zero_where_closed(graph, mechanism, &closed))
+            && (mechanism.has_numeric_constants || motion.is_zero_where_closed(graph, mechanism, &closed))
     })
 }
 
@@ -407,7 +407,7 @@ fn is_loop_closed(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId],
         tape.evaluate(&point)
             .is_some_and(|values| values.iter().all(|v| *v == FieldElement::ZERO))
     });
-    closes_exactly || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
+    closes_exactly || mechanism.has_numeric_constants && is_loop_closed_numerically(graph, mechanism, residual, &tape)
 }
 
 /// Whether a loop is closed up to the last digits of the file's lengths, at random angles.

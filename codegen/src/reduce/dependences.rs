@@ -122,7 +122,7 @@ impl DependenceStructure {
             dependencies,
             method: ReductionMethod::Exact {
                 confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
-                at_values: mechanism.is_at_values,
+                at_values: mechanism.has_numeric_constants,
             },
         })
     }

@@ -83,10 +83,14 @@ fn introduction(mechanism: &Mechanism, each: &str) -> TextLine {
         effect.terms.iter().any(|term| term.expression.mentions(&is_place))
     };
     let is_motion = |quantity: PlaceQuantity| quantity != PlaceQuantity::Load && !quantity.is_other();
-    let mut line = vec![text("Each effect adds a force at its place.")];
+    let mut line = vec![text(
+        "Each effect adds its force, or its inertia and weight, at its place.",
+    )];
     let mut drives = mechanism.drives.iter();
-    if drives.any(|drive| matches!(drive.kind, DriveKind::Linear { .. })) {
-        line.push(text(" The name of a linear drive stands for its length."));
+    if by_expression().next().is_some() && drives.any(|drive| matches!(drive.kind, DriveKind::Linear { .. })) {
+        line.push(text(
+            " In the expressions below, the name of a linear drive means its length.",
+        ));
     }
     if by_expression().any(|effect| mentions(effect, &|quantity| quantity == PlaceQuantity::Load)) {
         line.push(text(" The symbol "));

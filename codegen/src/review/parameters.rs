@@ -32,7 +32,7 @@ pub(super) fn summary(page: &mut PageDocument, derivation: &Derivation) {
             passive,
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
-            count(mechanism.effects.len(), "further effect", "further effects"),
+            count(mechanism.effects.len(), "effect", "effects"),
             count(reduction.products.len(), "product", "products"),
             count(reduction.retained.len(), "base parameter", "base parameters"),
         )),

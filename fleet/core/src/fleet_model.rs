@@ -41,7 +41,7 @@ pub struct FleetFit {
 impl FleetModel {
     /// The plan with its derived model.
     pub(crate) fn new(plan: FleetPlan, common: ReferenceFit) -> Self {
-        let drives = common.model().drives();
+        let drives = common.model().row_names();
         let usual = plan.reference.still.iter();
         let still = usual.map(|(name, still)| (name.clone(), drives.contains(name), *still));
         Self {
@@ -71,12 +71,14 @@ impl FleetModel {
     pub fn columns(&self) -> Vec<String> {
         let model = self.common.model();
         let time = std::iter::once("t".to_owned());
-        time.chain(model.active_coordinates()).chain(model.drives()).collect()
+        time.chain(model.active_coordinates())
+            .chain(model.row_names())
+            .collect()
     }
 
     /// Names of the drives.
     pub fn drives(&self) -> Vec<String> {
-        self.common.model().drives()
+        self.common.model().row_names()
     }
 
     /// The summary of no recordings.

@@ -42,7 +42,7 @@ impl FleetFault {
         Self(says.to_string().into())
     }
 
-    /// The message, in which a front end spells options and commands in its own way.
+    /// The message, in which a front end writes options and commands in its own way.
     pub fn message(&self) -> &Message {
         &self.0
     }

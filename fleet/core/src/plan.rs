@@ -285,7 +285,7 @@ fn fixed_preparation(chosen: &PreparedRecording, reading: &RecordingOptions) -> 
 /// For each coordinate and drive the longest interval with a constant reading in any recording, as a share of that
 /// recording.
 fn standstill_shares(model: &Model, recordings: &[PreparedRecording]) -> Vec<(String, f64)> {
-    let names = model.active_coordinates().into_iter().chain(model.drives());
+    let names = model.active_coordinates().into_iter().chain(model.row_names());
     names
         .map(|name| {
             let of = |one: &PreparedRecording| one.raw_column(&name).map_or(0.0, FrozenReading::longest_share);

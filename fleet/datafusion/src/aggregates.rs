@@ -257,7 +257,7 @@ impl Accumulator for SummaryAccumulator {
 
     /// Memory of the group, bytes.
     fn size(&self) -> usize {
-        let sum = self.sum.as_ref().map_or(0, |sum| 8 * sum.whole.gram.len());
+        let sum = self.sum.as_ref().map_or(0, |sum| 8 * sum.all_columns.gram.len());
         size_of_val(self) + self.samples.size() + sum
     }
 }

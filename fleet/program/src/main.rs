@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use modelmill::print::{CommandName, LibrarySpelling, OptionName, OptionSetting, RemedySpelling};
+use modelmill::print::{CommandName, OptionName, OptionSetting, RemedyWording, RustWording};
 use modelmill::recording::{RecordingOptions, StatePreparation};
 use modelmill_fleet::{FleetFault, folder};
 use modelmill_fleet_program::{generate, identify, score};
@@ -161,24 +161,24 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(fault) => {
-            eprintln!("error: {}", fault.message().spell(&FleetSpelling));
+            eprintln!("error: {}", fault.message().format_for(&FleetWording));
             ExitCode::from(1)
         }
     }
 }
 
-/// Spells options as flags of this program, and commands as those of `modelmill`.
-struct FleetSpelling;
+/// Writes options as flags of this program, and commands as those of `modelmill`.
+struct FleetWording;
 
-impl RemedySpelling for FleetSpelling {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+impl RemedyWording for FleetWording {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
         let one = |setting: &OptionSetting| {
             let flag = match setting.name {
                 OptionName::Columns => "--map",
                 OptionName::CutoffHz => "--cutoff",
                 OptionName::Decimate => "--decimate",
                 OptionName::SkipBadSamples => "--skip-bad-samples",
-                _ => return LibrarySpelling.spell_options(std::slice::from_ref(setting)),
+                _ => return RustWording.format_options(std::slice::from_ref(setting)),
             };
             match &setting.value {
                 None => format!("`{flag}`"),
@@ -188,7 +188,7 @@ impl RemedySpelling for FleetSpelling {
         settings.iter().map(one).collect::<Vec<_>>().join(" ")
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
+    fn format_command(&self, command: CommandName) -> String {
         format!("`modelmill {}`", command.name())
     }
 }

@@ -318,7 +318,7 @@ mod tests {
 
     use super::*;
     use crate::ReadOptions;
-    use modelmill_boundary::text::LibrarySpelling;
+    use modelmill_boundary::text::RustWording;
 
     fn says(q: impl Fn(f64) -> f64, force: impl Fn(f64) -> f64) -> Vec<String> {
         let mut text = "t,q,motor\n".to_owned();
@@ -400,7 +400,7 @@ mod tests {
                 writeln!(text, "{t},{q},{},{}", scale * rate, scale * acceleration).unwrap();
             }
             let recording = SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-            Remedy::options(recording.unwrap().degree_conversion_options("q")).spell(&LibrarySpelling)
+            Remedy::options(recording.unwrap().degree_conversion_options("q")).format_for(&RustWording)
         };
         assert_eq!(
             of(1.0),

@@ -88,7 +88,7 @@ pub struct FitParameter {
 pub struct FitFile {
     /// Name of the model.
     pub model: String,
-    /// Number of samples of the fit, each of all channels.
+    /// Number of sampling times of the fit; each has one force per drive.
     pub samples: usize,
     /// Condition number of the regressor (2-norm); `null` if its rank is deficient.
     pub condition_number: Option<f64>,

@@ -1,6 +1,6 @@
 //! Faults of a recording, each with its place, what was expected, and what to do.
 //!
-//! A fault is a value; its message has typed remedies, which each front end spells in its own words.
+//! A fault is a value; its message has typed remedies, which each front end writes in its own words.
 
 use std::fmt;
 

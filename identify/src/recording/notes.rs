@@ -1,7 +1,7 @@
 //! Notes: facts about the data that a user should know although they are not errors. They go to the terminal and into
 //! the JSON (`"data": [{"severity", "says"}]`).
 
-use modelmill_boundary::text::{Message, RemedySpelling};
+use modelmill_boundary::text::{Message, RemedyWording};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// How much a [`RecordingNote`] matters.
@@ -24,9 +24,9 @@ pub struct RecordingNote {
     pub says: Message,
 }
 
-/// A note in JSON, with remedies already spelled.
+/// A note in JSON, with remedies already written out.
 #[derive(Serialize, Deserialize)]
-struct SpelledNote {
+struct FormattedNote {
     /// As in [`RecordingNote`].
     severity: NoteSeverity,
     /// The text.
@@ -50,15 +50,15 @@ impl RecordingNote {
         }
     }
 
-    /// The note as JSON, with remedies spelled for the reader's front end.
-    pub fn json(&self, spelling: &dyn RemedySpelling) -> serde_json::Value {
-        serde_json::json!({ "severity": self.severity, "says": self.says.spell(spelling) })
+    /// The note as JSON, with remedies written for the reader's front end.
+    pub fn json(&self, wording: &dyn RemedyWording) -> serde_json::Value {
+        serde_json::json!({ "severity": self.severity, "says": self.says.format_for(wording) })
     }
 }
 
-/// Writes notes with remedies spelled for the library. A fit that no front end has printed keeps them in this form.
+/// Writes notes with remedies written for the library. A fit that no front end has printed keeps them in this form.
 pub(crate) fn serialize<S: Serializer>(notes: &[RecordingNote], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(notes.iter().map(|note| SpelledNote {
+    serializer.collect_seq(notes.iter().map(|note| FormattedNote {
         severity: note.severity,
         says: note.says.in_library_words(),
     }))
@@ -66,8 +66,8 @@ pub(crate) fn serialize<S: Serializer>(notes: &[RecordingNote], serializer: S) -
 
 /// Reads notes, whose texts are plain then.
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<RecordingNote>, D::Error> {
-    let notes = Vec::<SpelledNote>::deserialize(deserializer)?.into_iter();
-    let note = |one: SpelledNote| RecordingNote {
+    let notes = Vec::<FormattedNote>::deserialize(deserializer)?.into_iter();
+    let note = |one: FormattedNote| RecordingNote {
         severity: one.severity,
         says: one.says.into(),
     };

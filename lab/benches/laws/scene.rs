@@ -84,7 +84,7 @@ impl Machine {
     pub(crate) fn drives(&self) -> Vec<String> {
         match self {
             Self::SpiderMill(_) => DRIVES.map(str::to_owned).to_vec(),
-            Self::Arm(model, _) => model.drives(),
+            Self::Arm(model, _) => model.row_names(),
         }
     }
 
@@ -205,9 +205,9 @@ fn arm(model: &Model, course: &DrawnCourse, rate: f64) -> Result<Scene, String> 
     };
     let evaluator = ModelEvaluator::new(&model.derivation);
     let fault = |fault| format!("{fault:?}");
-    let plain = evaluator.inverse_dynamics(&states, &model.nominal).map_err(fault)?;
+    let plain = evaluator.inverse_dynamics(&states, &model.values).map_err(fault)?;
     let regressor = evaluator.regressor(&states).map_err(fault)?;
-    let drives = model.drives();
+    let drives = model.row_names();
     let base = (0..regressor.ncols()).map(|k| {
         let rows: Vec<f64> = regressor.column(k).iter().copied().collect();
         by_drive(&rows, drives.len()).concat()

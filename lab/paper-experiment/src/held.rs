@@ -87,6 +87,6 @@ fn table(model: &Model, segment: &RecordingSegment) -> Vec<(String, Vec<f64>)> {
             columns.push((format!("{name}{suffix}"), values[i].clone()));
         }
     }
-    columns.extend(model.drives().into_iter().zip(run.force.iter().flatten().cloned()));
+    columns.extend(model.row_names().into_iter().zip(run.force.iter().flatten().cloned()));
     columns
 }

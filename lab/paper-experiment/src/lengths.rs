@@ -58,8 +58,8 @@ fn errors_at(host: &Host, series: &[FourierSeries], distance: f64) -> Outcome<Di
     let data = RecordingSegment::from(PreparedRun::from_states(name, time, states, None));
     let (paper, consistent) = (variant("spidermill-paper.toml")?, variant("spidermill.toml")?);
     let forces = [
-        along::forces(&paper, &data, &paper.nominal)?,
-        along::forces(&consistent, &data, &consistent.nominal)?,
+        along::forces(&paper, &data, &paper.values)?,
+        along::forces(&consistent, &data, &consistent.values)?,
     ];
     let along = TreatmentRun {
         time: data.time(),

@@ -119,7 +119,7 @@ impl PaperExperiment {
         let rig = bundled::rig("spidermill-full.toml")?;
         let data = runs::run(&rig, &paper, &trajectories[0], args.rate)?;
         let base = [
-            paper.nominal.clone(),
+            paper.values.clone(),
             study::consistent_values(&paper, &consistent, &data)?,
             study::values_with(&paper, &printed::ESTIMATED),
         ];

@@ -188,7 +188,7 @@ impl ExperimentPage {
         }
         self.improvement(experiment);
         // Errors over time on both rigs.
-        let drives = experiment.paper.drives();
+        let drives = experiment.paper.row_names();
         self.figure(
             &figures::errors(
                 "Forces and errors, verification run, rig as in Table 1",
@@ -275,7 +275,7 @@ impl ExperimentPage {
             &rows,
         );
         // Error, explanation and residual over time.
-        let drives = experiment.paper.drives();
+        let drives = experiment.paper.row_names();
         for (bench, title) in experiment.benches.iter().zip([
             "Verification run, rig as in Table 1",
             "Verification run, rig with spindle rods",
@@ -292,7 +292,7 @@ impl ExperimentPage {
         self.heading("5  The peaks of the relative error");
         // The left spindle in the verification run, since its force often passes through zero.
         let along = &experiment.benches[0].runs[1];
-        let drives = experiment.paper.drives();
+        let drives = experiment.paper.row_names();
         let modelled = &along.calculated[0];
         // Samples near zero, and their contribution to the mean relative error.
         let [samples, part] = along.near_zero(0, modelled, NEAR_ZERO);

@@ -85,7 +85,7 @@ impl ExperimentPage {
             &figures::printed_change(
                 "What the paper's identification changed, verification run",
                 &runs[1],
-                &experiment.paper.drives(),
+                &experiment.paper.row_names(),
             ),
             "Forces with the estimated parameters of the paper's Table 1 minus forces with its calculated ones, in \
              its own treatment.",

@@ -157,7 +157,7 @@ pub(crate) fn run(rig: &Rig, model: &Model, periodic: &PeriodicTrajectory, rate:
         .map(|name| rig.coordinates.iter().position(|c| c.name == *name))
         .collect::<Option<Vec<usize>>>();
     let drives = model
-        .drives()
+        .row_names()
         .iter()
         .map(|name| rig.drives.iter().position(|d| d.name == *name))
         .collect::<Option<Vec<usize>>>();

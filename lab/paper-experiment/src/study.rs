@@ -95,7 +95,7 @@ impl TreatmentStudy {
             Ok(TreatmentRun {
                 time: one.time(),
                 measured: along::measured_forces(one)?,
-                calculated: forces([&paper.nominal, &consistent.nominal])?,
+                calculated: forces([&paper.values, &consistent.values])?,
                 estimated: forces([&fits[0].values(), &fits[1].values()])?,
                 printed: along::forces(paper, one, &values_with(paper, &printed::ESTIMATED))?,
             })
@@ -234,7 +234,7 @@ fn difference(a: &DriveColumns, b: &DriveColumns) -> DriveColumns {
 pub(crate) fn consistent_values(paper: &Model, consistent: &Model, data: &RecordingSegment) -> Outcome<Vec<f64>> {
     // The forces of the consistent model take the place of measured ones.
     let run = PreparedRun {
-        force: Some(along::forces(consistent, data, &consistent.nominal)?),
+        force: Some(along::forces(consistent, data, &consistent.values)?),
         ..data.run.clone()
     };
     Ok(

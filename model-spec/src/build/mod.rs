@@ -132,7 +132,7 @@ pub(crate) fn build(
         retain,
         limits,
         recording: RecordingColumns { columns, torque },
-        is_at_values: false,
+        has_numeric_constants: false,
     };
     // These checks need the complete mechanism at its nominal values.
     bodies::warn_of_negative(model, &mechanism, log);

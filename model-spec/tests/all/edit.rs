@@ -295,12 +295,16 @@ fn every_kind_can_be_added() {
 #[test]
 fn every_kind_explains_itself() {
     for kind in library() {
-        assert!(kind.explains.len() > 100 && kind.doubles.len() > 60, "{}", kind.name);
+        assert!(
+            kind.explains.len() > 100 && kind.confused_with.len() > 60,
+            "{}",
+            kind.name
+        );
         for constant in &kind.constants {
             assert!(constant.search.is_some(), "{} {}", kind.name, constant.symbol);
         }
         assert!(
-            !kind.explains.contains('\n') && !kind.doubles.contains('\n'),
+            !kind.explains.contains('\n') && !kind.confused_with.contains('\n'),
             "{}",
             kind.name
         );

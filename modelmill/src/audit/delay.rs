@@ -74,7 +74,7 @@ impl ForceDelayAudit {
             excluded_forces: &pick(&run.left_out, &read),
             max_delay: longest,
         })?;
-        let names = model.drives();
+        let names = model.row_names();
         Some(Self {
             delays,
             step,

@@ -51,7 +51,7 @@ pub(crate) fn gear_factors(model: &Model, data: &RecordingSegment) -> Vec<Option
     let Some(regressor) = regressor(model, data, &samples) else {
         return Vec::new();
     };
-    let expected = regressor * DVector::from_column_slice(&model.nominal);
+    let expected = regressor * DVector::from_column_slice(&model.values);
     let of_drive = |d: usize| {
         // Rows are interleaved by drive.
         let expected: Vec<f64> = expected.iter().skip(d).step_by(forces.len()).copied().collect();

@@ -20,7 +20,7 @@ pub(crate) fn clock(
     all: &SegmentList<'_>,
     slopes: &[Option<[ForceColumn; 3]>],
 ) -> Option<CandidateEffect> {
-    let mut column = ForceColumn(vec![None; model.drives().len()]);
+    let mut column = ForceColumn(vec![None; model.row_names().len()]);
     for (i, slopes) in slopes.iter().enumerate() {
         let [_, by_rate, by_acceleration] = slopes.as_ref()?;
         for (factor, slope, is_rate) in [(1.0, by_rate, true), (2.0, by_acceleration, false)] {

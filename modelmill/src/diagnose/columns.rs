@@ -267,7 +267,7 @@ fn single_columns(
     let columns = regressor_of(all, &evaluator, model, &wanted)?;
     // In products with other parameters, such as a mass at an unknown place, the others have their nominal values.
     let of = |(_, parameter): &(String, usize)| -> ForceColumn {
-        let mut sum = ForceColumn(vec![None; model.drives().len()]);
+        let mut sum = ForceColumn(vec![None; model.row_names().len()]);
         // A parameter may occur in several products.
         for (k, product) in reduction.retained.iter().enumerate() {
             let powers = &reduction.products[*product].0;
@@ -516,7 +516,7 @@ pub(crate) fn load_dependent_columns(
             }
             // A column without finite values for these loads counts as zero.
             if !columns.iter().all(is_finite) {
-                columns.fill(ForceColumn(vec![None; model.drives().len()]));
+                columns.fill(ForceColumn(vec![None; model.row_names().len()]));
             }
             ColumnChoice {
                 constants: symbol.map(|one| (one.to_owned(), *value)).into_iter().collect(),

@@ -92,7 +92,7 @@ impl<'a> GeometryColumns<'a> {
         for (k, at) in positions.iter().enumerate() {
             estimated[*at] = (!is_held(k)).then_some(k);
             // Values of an earlier fit replace those of the nominal parameters.
-            shifts[*at] = model.nominal[k] - own.base[k];
+            shifts[*at] = model.values[k] - own.base[k];
         }
         Self {
             changes: BaseValueChanges::new(evaluated, &constants, shifts),
@@ -159,7 +159,7 @@ impl<'a> GeometryColumns<'a> {
     /// First and second derivative of the columns by a constant, from those at both sides and in the middle. `None` if
     /// base values do not exist there.
     fn correction(&self, k: usize, step: f64, columns: [&[ForceColumn]; 3]) -> Option<ConstantCorrection> {
-        let n_drives = self.model.drives().len();
+        let n_drives = self.model.row_names().len();
         let values = [-step, 0.0, step].map(|step| self.changes.values(self.evaluated, k, step));
         let needs_values = self.has_rest || self.estimated.iter().any(Option::is_none);
         if needs_values && values.iter().flatten().any(|x| !x.is_finite()) {

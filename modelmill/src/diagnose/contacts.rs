@@ -196,7 +196,7 @@ fn residual_trace(
     if time.len() < super::thresholds::FEWEST_SAMPLES {
         return None;
     }
-    let drives = model.drives().len();
+    let drives = model.row_names().len();
     let samples: Vec<usize> = (0..one.run.time.len()).step_by(one.decimation()).collect();
     let motion = motion_of_drives(model, &standing_states(model, &one.run, &samples, &time), &time)?;
     // A row without drive has no force and no residual.

@@ -94,7 +94,7 @@ fn are_differences_needed(
     without: &DiagnosisSolution,
     least_gain: f64,
 ) -> bool {
-    let drives = model.drives();
+    let drives = model.row_names();
     let is_concerned = |d: usize| between.iter().any(|one| one.acts_on(d));
     let is_new = |one: &&Disturbance| {
         with.diagnosis

@@ -53,7 +53,7 @@ fn elastic_drive(version: &ModelVersion, coordinate: &str, [sine, cosine]: [f64;
         return None;
     }
     // Friction does not load the gear.
-    let carried: Vec<f64> = (model.nominal.iter().enumerate())
+    let carried: Vec<f64> = (model.values.iter().enumerate())
         .map(|(k, value)| if model.is_effect(k) { 0.0 } else { *value })
         .collect();
     let (mut weights, mut errors) = (Vec::new(), Vec::new());

@@ -44,7 +44,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
     let each = each.filter_map(|(one, i)| has_encoder(&i).then_some(one));
     let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[ForceColumn; 3]>)| {
         let [by_position, ..] = slopes.as_ref()?;
-        let mut column = ForceColumn(vec![None; model.drives().len()]);
+        let mut column = ForceColumn(vec![None; model.row_names().len()]);
         // The shift is the recorded minus the true position: forces are those of the true motion.
         column.add(-1.0, by_position);
         Some(CandidateEffect {
@@ -131,7 +131,7 @@ pub(crate) fn encoders(
                     let rate = k * cos * qd[j];
                     [sin, rate, k * cos * qdd[j] - k * k * sin * qd[j] * qd[j]]
                 };
-                let mut column = ForceColumn(vec![None; model.drives().len()]);
+                let mut column = ForceColumn(vec![None; model.row_names().len()]);
                 for (order, slope) in slopes.iter().enumerate() {
                     let mut part = slope.clone();
                     for values in part.0.iter_mut().flatten() {
@@ -186,7 +186,7 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
     (0..model.base.len())
         .map(|k| {
             if held == FixedParameters::All || model.is_known(k) {
-                model.nominal[k]
+                model.values[k]
             } else {
                 next.next().copied().unwrap_or(0.0)
             }

@@ -36,8 +36,8 @@ pub(crate) fn subtract_known(
     all: &SegmentList<'_>,
     between: &[RecordingDifference],
 ) -> Outcome<Vec<Vec<bool>>> {
-    problem.removed.resize(model.drives().len(), 0.0);
-    problem.removed_differences.resize(model.drives().len(), 0.0);
+    problem.removed.resize(model.row_names().len(), 0.0);
+    problem.removed_differences.resize(model.row_names().len(), 0.0);
     // Powers are means over all samples.
     let samples = problem.layout.samples().max(1) as f64;
     // Differences between recordings are subtracted, and their power is counted as removed.
@@ -129,7 +129,7 @@ fn difference(one: &RecordingDifference) -> Disturbance {
 ///
 /// Fails when a recording has no forces.
 fn add_quantisation_noise(problem: &mut DiagnosisProblem, model: &Model, all: &SegmentList<'_>) -> Outcome<()> {
-    for (d, drive) in model.drives().iter().enumerate() {
+    for (d, drive) in model.row_names().iter().enumerate() {
         // Steps are found in the recorded values, before any filter.
         let mut recorded = Vec::new();
         for (one, _) in all {

@@ -424,7 +424,7 @@ impl DiagnosisFindings {
         let mut kinds = self.answer.candidates.kinds.iter();
         let known = kinds.find(|one| one.name == kind);
         // The text of the library comes first, if it has one.
-        let known = known.map_or("", |one| one.doubles.as_str());
+        let known = known.map_or("", |one| one.confused_with.as_str());
         let motion = format!(
             "To decide, record a motion over more of the travel of {places}, at other speeds and with another load."
         );
@@ -571,7 +571,7 @@ fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect)
     }
     let kinds = &findings.answer.candidates.kinds;
     let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
-    (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
+    (!kind.confused_with.is_empty()).then(|| kind.confused_with.clone())
 }
 
 /// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds

@@ -36,7 +36,7 @@ pub(crate) fn gears(
     let carried: Vec<f64> = (values.iter().enumerate())
         .map(|(k, value)| if model.is_effect(k) { 0.0 } else { *value })
         .collect();
-    let n = model.drives().len();
+    let n = model.row_names().len();
     let loads = stack(all, |one| {
         let loads = along::forces(model, one, &carried)?;
         // Central differences in time.

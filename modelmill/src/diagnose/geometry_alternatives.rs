@@ -128,7 +128,7 @@ impl<'a> GeometryComparison<'a> {
     fn new(version: &'a ModelVersion, named: Option<&'a NamedZeros>, held: FixedParameters) -> Option<Self> {
         let model = &version.model;
         let varied = named.map_or(model, |named| &named.model);
-        let n_drives = varied.drives().len();
+        let n_drives = varied.row_names().len();
         // Forces drive by drive, all recordings one after the other.
         let stacked = |of: &dyn Fn(&ForceComparison, usize) -> Vec<f64>| -> Vec<Vec<f64>> {
             let column = |d| version.runs.iter().flat_map(|run| of(run, d)).collect();

@@ -50,7 +50,7 @@ fn change(model: &Model, base: &[ForceColumn], at: &[EffectPlace], terms: &[&Eff
         unit: model.base[*k].unit.clone(),
         sign: SignConstraint::Any,
     };
-    let names = model.drives();
+    let names = model.row_names();
     Some(CandidateEffect {
         effect: LocatedEffect {
             kind: "different_runs".to_owned(),

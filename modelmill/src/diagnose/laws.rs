@@ -71,7 +71,7 @@ pub(crate) fn sites(candidates: &DerivedCandidates, model: &Model, all: &Segment
 fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColumn {
     // Samples after decimation, over all recordings.
     let samples = all.iter().map(|(one, _)| one.time().len()).sum();
-    let mut column = ForceColumn(vec![None; model.drives().len()]);
+    let mut column = ForceColumn(vec![None; model.row_names().len()]);
     column.0[drive] = Some(vec![1.0; samples]);
     column
 }
@@ -585,7 +585,7 @@ mod tests {
             kind: kind.to_owned(),
             at: vec![at.to_owned()],
         };
-        let drive = model.drives()[0].clone();
+        let drive = model.row_names()[0].clone();
         let joint = joint_of(&model, &drive).to_owned();
         assert_ne!(joint, drive);
         let sites = [LawSite {
@@ -595,7 +595,7 @@ mod tests {
         let found = [
             effect("coulomb_friction", &drive),
             effect("viscous_friction", &drive),
-            effect("coulomb_friction", &model.drives()[1]),
+            effect("coulomb_friction", &model.row_names()[1]),
         ];
         let proposed = Proposed {
             site: 0,

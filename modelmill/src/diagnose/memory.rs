@@ -26,7 +26,7 @@ const LENGTHS: [f64; 12] = [
 /// Fails when a pose has no solution.
 pub(crate) fn dahl_candidates(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
-    let drives = model.drives();
+    let drives = model.row_names();
     let mut candidates = Vec::new();
     let positions = |one: &RecordingSegment| -> Outcome<Vec<Vec<f64>>> {
         let mut columns = along::columns(model, one, |states| evaluator.drive_motion(states))?;

@@ -67,7 +67,7 @@ impl ModelVersion {
         // Base parameters of the fit, or nominal ones.
         let values = match &identified {
             Some(result) => result.values(),
-            None => model.nominal.clone(),
+            None => model.values.clone(),
         };
         // Fitted recordings come first, so the index shows which are validation runs.
         let n_fit = fit.len();

@@ -38,9 +38,9 @@ pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
         all.iter().flat_map(of).collect()
     };
     // Without left-out samples the layout has no masks, which saves memory.
-    let drives = if all_count { 0 } else { model.drives().len() };
+    let drives = if all_count { 0 } else { model.row_names().len() };
     SampleLayout {
-        channels: model.drives(),
+        channels: model.row_names(),
         segments: all.iter().map(stretch).collect(),
         left_out: (0..drives).map(of_drive).collect(),
     }

@@ -88,7 +88,7 @@ fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
     let derivation = &version.model.derivation;
     let mechanism = &derivation.mechanism;
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-    let nominal = version.model.nominal[k];
+    let nominal = version.model.values[k];
     // A fixed seed: the same recording always gives the same warning.
     let mut random = Random::new(1);
     let may_turn = |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";

@@ -48,7 +48,7 @@ pub(crate) fn frame_loads(model: &Model, all: &SegmentList<'_>, payloads: &Paylo
     let of = |k: &Option<usize>| -> ForceColumn {
         let column = k.map(|k| &columns[k]);
         let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
-        column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
+        column.map_or_else(|| ForceColumn(vec![None; model.row_names().len()]), Clone::clone)
     };
     let frames = payloads.frames.iter().zip(&payloads.columns).rev();
     let loads = frames.map(|(frame, which)| FrameLoad {

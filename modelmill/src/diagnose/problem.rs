@@ -274,7 +274,7 @@ fn fault_candidates(
 
 /// The unit of the force of each drive.
 fn force_units(model: &Model) -> Vec<String> {
-    (0..model.drives().len())
+    (0..model.row_names().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect()
 }
@@ -312,7 +312,7 @@ fn drop_excluded_candidates(
 /// Completes a disturbance: the units of its place, and a sentence.
 fn describe_disturbance(one: &mut Disturbance, model: &Model) {
     // A disturbance of a drive has the unit of its force.
-    let drives = model.drives();
+    let drives = model.row_names();
     let place = one.at.first();
     let drive = drives.iter().position(|drive| Some(drive) == place);
     if let Some(d) = drive {
@@ -499,11 +499,11 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
     let has_prior = problem.prior.is_some();
     let is_fitted = |k: usize| has_prior && fitted.contains(&k);
     // The force of fixed parameters is summed; columns of the others stay.
-    let mut known = ForceColumn(vec![None; model.drives().len()]);
+    let mut known = ForceColumn(vec![None; model.row_names().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
         if is_held(k) {
-            known.add(model.nominal[k], &column);
+            known.add(model.values[k], &column);
         }
         if !is_held(k) || is_fitted(k) {
             free.push(column);
@@ -517,7 +517,7 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
                 let mut free = Vec::new();
                 for (k, column) in std::mem::take(&mut change.base).into_iter().enumerate() {
                     if is_held(k) {
-                        change.fixed.add(model.nominal[k], &column);
+                        change.fixed.add(model.values[k], &column);
                     } else {
                         free.push(column);
                     }

@@ -314,9 +314,9 @@ impl ChosenEffect {
             ColumnSource::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];
                 let sum = |direction: [f64; 3]| {
-                    let mut sum = ForceColumn(vec![None; model.drives().len()]);
+                    let mut sum = ForceColumn(vec![None; model.row_names().len()]);
                     for (share, change) in direction.iter().zip(&tilt.components) {
-                        for (nominal, change) in model.nominal.iter().zip(&change.base) {
+                        for (nominal, change) in model.values.iter().zip(&change.base) {
                             sum.add(share * nominal, change);
                         }
                     }
@@ -343,17 +343,17 @@ pub(crate) fn base_columns(
     all: &SegmentList<'_>,
 ) -> Outcome<(Vec<ForceColumn>, ForceColumn, ForceColumn)> {
     let every = regressor(all, &ModelEvaluator::new(&model.derivation), model)?;
-    let none = ForceColumn(vec![None; model.drives().len()]);
+    let none = ForceColumn(vec![None; model.row_names().len()]);
     // The load is the force of all bodies; the known force is subtracted before a fit.
     let (mut load, mut known) = (none.clone(), none);
     let mut free = Vec::new();
     // Bodies make the load; effects such as friction do not.
     for (k, column) in every.into_iter().enumerate() {
         if !model.is_effect(k) {
-            load.add(model.nominal[k], &column);
+            load.add(model.values[k], &column);
         }
         if model.is_known(k) {
-            known.add(model.nominal[k], &column);
+            known.add(model.values[k], &column);
         } else {
             free.push(column);
         }

@@ -71,12 +71,12 @@ impl SignalDelays {
                 found.computed.push((one.drive, one.is_commanded));
             }
             // A force that was computed with a delay too small by `shift` is too large by the slope times `-shift`.
-            let mut column = ForceColumn(vec![None; model.drives().len()]);
+            let mut column = ForceColumn(vec![None; model.row_names().len()]);
             column.0[one.drive] = Some(slope.into_iter().map(|x| -x).collect());
             if one.is_estimated {
                 found.estimated.push(column);
             } else {
-                found.candidates.push(candidate(&model.drives()[one.drive], column));
+                found.candidates.push(candidate(&model.row_names()[one.drive], column));
             }
         }
         Ok(found)
@@ -88,7 +88,7 @@ impl SignalDelays {
     /// distinguished from its noise and from jumps of friction.
     pub(super) fn excludes(&self, model: &Model, candidate: &CandidateEffect) -> bool {
         let is_of_command = |(drive, is_commanded): &(usize, bool)| {
-            *is_commanded && candidate.effect.at.contains(&model.drives()[*drive])
+            *is_commanded && candidate.effect.at.contains(&model.row_names()[*drive])
         };
         if BLURRED_KINDS.contains(&candidate.effect.kind.as_str()) {
             return self.computed.iter().any(is_of_command);
@@ -108,7 +108,7 @@ impl SignalDelays {
     /// For each drive whether its force was computed from a command.
     pub(super) fn is_commanded(&self, model: &Model) -> Vec<bool> {
         let is_it = |drive: usize| self.computed.contains(&(drive, true));
-        (0..model.drives().len()).map(is_it).collect()
+        (0..model.row_names().len()).map(is_it).collect()
     }
 
     /// What the diagnosis does not search in computed forces, as a note; `None` if all forces were measured.
@@ -118,7 +118,7 @@ impl SignalDelays {
                 .computed
                 .iter()
                 .filter(|(_, is_commanded)| is_wanted(*is_commanded));
-            drives.map(|(drive, _)| model.drives()[*drive].clone()).collect()
+            drives.map(|(drive, _)| model.row_names()[*drive].clone()).collect()
         };
         let all = names(&|_| true);
         if all.is_empty() {

@@ -56,7 +56,7 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>
         // The difference of both directions, per unit of gravity.
         let changes: Vec<ForceColumn> = (after.iter().zip(&before))
             .map(|(after, before)| {
-                let mut change = ForceColumn(vec![None; model.drives().len()]);
+                let mut change = ForceColumn(vec![None; model.row_names().len()]);
                 change.add(0.5 / size, after);
                 change.add(-0.5 / size, before);
                 change
@@ -66,14 +66,14 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>
         let change_of = |product: &ParameterMonomial| changes.iter().zip(products).find(|(_, other)| *other == product);
         // What the parameters have in addition to the base: those that act on no drive while the base is level, such as
         // the first moments of a link on a vertical axis, and dependencies that hold for level gravity only.
-        component.fixed = ForceColumn(vec![None; model.drives().len()]);
+        component.fixed = ForceColumn(vec![None; model.row_names().len()]);
         for (change, product) in changes.iter().zip(products) {
             component.fixed.add(product.value(&nominal), change);
         }
         // The base columns in the order of the model.
         for (retained, value) in own.retained.iter().zip(&level) {
             let change = change_of(&own.products[*retained]);
-            let none = ForceColumn(vec![None; model.drives().len()]);
+            let none = ForceColumn(vec![None; model.row_names().len()]);
             let change = change.map_or(none, |(change, _)| change.clone());
             component.fixed.add(-value, &change);
             component.base.push(change);
@@ -86,7 +86,7 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>
     };
     for (axis, direction) in every.directions(&[0.0; 3]).into_iter().enumerate() {
         let changes_forces = |part: &dyn Fn(&ForceSensitivity) -> ForceColumn| {
-            let mut change = ForceColumn(vec![None; model.drives().len()]);
+            let mut change = ForceColumn(vec![None; model.row_names().len()]);
             for (share, component) in direction.iter().zip(&tilt.components) {
                 change.add(*share, &part(component));
             }

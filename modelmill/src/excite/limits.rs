@@ -130,7 +130,7 @@ fn set_coordinate_limit(model: &Model, limits: &mut MotionLimits, limit: &Trajec
                 .map(|c| c.name.as_str())
                 .collect::<Vec<_>>()
                 .join(", "),
-            model.drives().join(", ")
+            model.row_names().join(", ")
         )));
     };
     // Rates of passive coordinates follow from the active ones.

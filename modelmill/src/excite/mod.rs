@@ -65,7 +65,8 @@ pub struct SeparationRequest {
     /// Effects that the machine has in any case and the model file lacks. They act with the effect and with its
     /// alternatives.
     pub common_effects: Vec<NamedEffect>,
-    /// Standard deviation of the noise in the forces, N or N m, as the scale of the difference.
+    /// Standard deviation of the noise in the forces, N or N m. The difference between the forces of the effects is given
+    /// in multiples of it.
     pub noise: Option<f64>,
 }
 
@@ -257,7 +258,7 @@ impl Model {
                 random: (-found.start_value).exp(),
                 before: separation.distance_along_recordings(self)?,
                 unit: separated::common_force_unit(self),
-                drives: self.drives().len(),
+                drives: self.row_names().len(),
                 samples,
                 task: separation,
             }),
@@ -377,7 +378,7 @@ fn picture(
     panel(&format!("acceleration, {}", per("s^2")), &motion.qdd, &names);
     // Forces of the nominal model show whether the drives can follow.
     if let Some(forces) = plant.forces(motion) {
-        panel("force of the nominal model, N or N m", &forces, &model.drives());
+        panel("force of the nominal model, N or N m", &forces, &model.row_names());
     }
     figure.finish()
 }

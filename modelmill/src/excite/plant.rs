@@ -109,7 +109,7 @@ impl<'a> ModelPlant<'a> {
     pub fn forces(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         let still = self.zero_load(motion);
         let states = states(motion, &still);
-        self.evaluator.inverse_dynamics(&states, &self.model.nominal).ok()
+        self.evaluator.inverse_dynamics(&states, &self.model.values).ok()
     }
 
     /// Zero forces of all drives along a motion.

@@ -214,7 +214,7 @@ impl SeparationSetup {
         let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(());
         };
-        let weights = self.weights(model.drives().len());
+        let weights = self.weights(model.row_names().len());
         // The force of known parameters is subtracted.
         let mut forces = ForceColumn::new(measured);
         forces.add(-1.0, &terms.known);
@@ -282,7 +282,7 @@ impl SeparationSetup {
         let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(None);
         };
-        let weights = self.weights(model.drives().len());
+        let weights = self.weights(model.row_names().len());
         // All columns become matrices with weighted rows.
         let of = |columns: &[ForceColumn]| matrix(columns, &weights, samples);
         let (candidate, columns) = &terms.truth;

@@ -5,7 +5,7 @@ use crate::text::wrap::wrap_words;
 use std::fmt::Write as _;
 
 use modelmill_boundary::message;
-use modelmill_boundary::text::{Message, OptionName, Remedy, RemedySpelling};
+use modelmill_boundary::text::{Message, OptionName, Remedy, RemedyWording};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::diagnose::LocatedEffect;
 use modelmill_identify::excite::{ExcitationLimits, Options, random_motions};
@@ -80,7 +80,7 @@ pub(crate) fn prepare_separation(
     // Values, noise and recordings of the request.
     let mut pair = SeparationSetup::new(model, &request.effect, &request.from, &request.common_effects)?;
     if let Some(size) = request.noise {
-        pair.set_noise(size, model.drives().len());
+        pair.set_noise(size, model.row_names().len());
     }
     let [data, _] = recording::segments(model, recordings, &[]);
     if !data.is_empty() {
@@ -279,7 +279,7 @@ impl SeparationResult {
 
     /// The result as lines of text. `evaluations` is the number of evaluated trajectories, `random` that of random
     /// ones.
-    pub fn text(&self, evaluations: usize, random: usize, spelling: &dyn RemedySpelling) -> Vec<String> {
+    pub fn text(&self, evaluations: usize, random: usize, wording: &dyn RemedyWording) -> Vec<String> {
         let pair = &self.task.pair;
         let mut lines = vec![format!("  separates {}", self.task.description())];
         let beside: Vec<LocatedEffect> = pair.common_effects().cloned().collect();
@@ -360,7 +360,7 @@ impl SeparationResult {
             "  {says}; {} were evaluated",
             count(evaluations, "trajectory", "trajectories")
         ));
-        lines.extend(self.remarks(spelling));
+        lines.extend(self.remarks(wording));
         lines
     }
 
@@ -370,7 +370,7 @@ impl SeparationResult {
     }
 
     /// Explanations of the figures.
-    fn remarks(&self, spelling: &dyn RemedySpelling) -> Vec<String> {
+    fn remarks(&self, wording: &dyn RemedyWording) -> Vec<String> {
         let pair = &self.task.pair;
         let mut lines = indent_lines(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
@@ -388,7 +388,7 @@ impl SeparationResult {
                 Remedy::option(OptionName::Noise).with_value("SIZE"),
                 Remedy::option(OptionName::Data).with_value("RUN")
             )
-            .spell(spelling),
+            .format_for(wording),
         });
         // A special case is named, since forces cannot exclude the more general effect.
         for k in &self.task.which {

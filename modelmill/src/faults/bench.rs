@@ -123,7 +123,7 @@ fn geometric_mean(errors: &[Option<f64>]) -> f64 {
 impl<'a> FaultBench<'a> {
     /// The samples of all segments of a recording at which all forces were measured; `None` if there are too few.
     pub(super) fn new(model: &'a Model, segments: &[RecordingSegment]) -> Option<Self> {
-        let drives = model.drives().len();
+        let drives = model.row_names().len();
         let total: usize = segments.iter().map(RecordingSegment::samples).sum();
         let wanted = (ROWS / drives.max(1)).clamp(BENCH_FEWEST_SAMPLES, SAMPLES);
         let every = (total / wanted).max(1);
@@ -253,9 +253,9 @@ fn nominal_values(model: &Model) -> Option<Vec<f64>> {
     let bodies: Vec<usize> = (0..model.base.len()).filter(|k| !model.is_effect(*k)).collect();
     let known = bodies
         .iter()
-        .filter(|k| model.has_nominal(**k) || model.is_known(**k))
+        .filter(|k| model.has_values(**k) || model.is_known(**k))
         .count();
-    (!bodies.is_empty() && 2 * known > bodies.len()).then(|| model.nominal.clone())
+    (!bodies.is_empty() && 2 * known > bodies.len()).then(|| model.values.clone())
 }
 
 /// Accelerations of the drives, without the part that comes from a changing Jacobian: `drive_motion` gives positions

@@ -37,7 +37,7 @@ fn exchanged_forces(places: [usize; 2], [to_other, to_one]: [ColumnScaling; 2]) 
 
 impl RecordingFaultEntry for ExchangedForces {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
-        let drives = subject.model.drives();
+        let drives = subject.model.row_names();
         let n = bench.forces().len();
         // Forces of different units, N and N m, have columns that differ too much to be confused.
         let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));

@@ -25,7 +25,7 @@ impl RecordingFaultEntry for ForceUnit {
 
 /// The hypothesis that some forces must be multiplied by a factor.
 fn hypothesis(subject: &FaultSubject<'_>, group: &[usize], factor: f64) -> FaultHypothesis {
-    let drives = subject.model.drives();
+    let drives = subject.model.row_names();
     let at: Vec<String> = group.iter().map(|d| drives[*d].clone()).collect();
     let is_large = factor < 1.0;
     // The option divides, where the unit itself cannot be named.

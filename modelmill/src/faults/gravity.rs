@@ -157,7 +157,7 @@ impl GravityRows {
             let mut gravity = [0.0; 3];
             gravity[axis] = signs[axis] * size;
             let turned = model.with_gravity(gravity).ok()?;
-            along.push(forces(&turned, &standstill, &turned.nominal)?);
+            along.push(forces(&turned, &standstill, &turned.values)?);
         }
         // Shares of the file's gravity in the three directions; their sum is at most -1.
         let shares = Vector3::from_fn(|k, _| given[k] * signs[k] / size);

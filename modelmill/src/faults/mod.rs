@@ -23,7 +23,7 @@ mod silent;
 mod thresholds;
 mod time_base;
 
-use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy, RemedySpelling};
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy, RemedyWording};
 use modelmill_identify::SignalRecording;
 use modelmill_identify::diagnose::Disturbance;
 use modelmill_spec::{DriveKind, Mechanism};
@@ -141,13 +141,13 @@ impl SuspectedFault {
     }
 
     /// The fault with its advice, in the answer of a diagnosis.
-    pub(crate) fn answer(&self, spelling: &dyn RemedySpelling) -> CorrectedFaultAnswer {
+    pub(crate) fn answer(&self, wording: &dyn RemedyWording) -> CorrectedFaultAnswer {
         CorrectedFaultAnswer {
             kind: self.kind.name().to_owned(),
             at: self.at.clone(),
             recordings: self.recordings.clone(),
             says: self.clause.clone(),
-            todo: self.advice.spell(spelling),
+            todo: self.advice.format_for(wording),
             heading: self.advice_heading().to_owned(),
         }
     }

@@ -21,7 +21,7 @@ fn reversed_column(name: &str) -> OptionSetting {
 impl RecordingFaultEntry for ForceSign {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis> {
         let n = bench.forces().len();
-        let drives = subject.model.drives();
+        let drives = subject.model.row_names();
         // A drive alone has another sensor or driver; all drives together have another convention.
         let mut groups: Vec<Vec<usize>> = (0..n).map(|d| vec![d]).collect();
         if n > 1 {

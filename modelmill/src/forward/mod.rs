@@ -104,7 +104,7 @@ impl Model {
             coordinates: self.active_coordinates(),
             q: found.q,
             qd: found.qd,
-            forces: self.drives().into_iter().zip(measured.iter().cloned()).collect(),
+            forces: self.row_names().into_iter().zip(measured.iter().cloned()).collect(),
         })
     }
 

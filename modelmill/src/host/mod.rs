@@ -26,7 +26,7 @@ pub struct Host {
     /// Paths of libraries of effects in addition to the built-in one.
     libraries: Vec<PathBuf>,
     /// Whether constants are replaced by their numeric values before the derivation.
-    is_at_values: bool,
+    has_numeric_constants: bool,
     /// Receives progress and notes.
     progress: Arc<dyn ProgressListener>,
     /// When all jobs end.
@@ -38,7 +38,7 @@ impl Default for Host {
         Self {
             files: Arc::new(DiskFiles::default()),
             libraries: Vec::new(),
-            is_at_values: false,
+            has_numeric_constants: false,
             progress: Arc::new(SilentProgress),
             deadline: None,
         }
@@ -115,7 +115,8 @@ impl Host {
     }
 
     /// The host with a time limit, counted from this call: all jobs fail with [`Error::Cancelled`] once it is over.
-    /// Derivations, searches and jobs that count their steps end at the next step, others at their end.
+    /// Derivations, searches and jobs that count their steps stop at the next step. All other jobs run to their end and
+    /// then fail.
     ///
     /// ```
     /// use std::time::Duration;
@@ -137,14 +138,14 @@ impl Host {
     /// If they are replaced, the model is valid only for the values of its file. Fewer base parameters may remain, for
     /// example if lengths are zero or equal. Generated code then has no inputs for lengths and angles of the geometry.
     #[must_use]
-    pub fn at_values(mut self, is_wanted: bool) -> Self {
-        self.is_at_values = is_wanted;
+    pub fn with_numeric_constants(mut self, is_wanted: bool) -> Self {
+        self.has_numeric_constants = is_wanted;
         self
     }
 
     /// Whether constants are replaced by their numeric values before the derivation.
-    pub fn is_at_values(&self) -> bool {
-        self.is_at_values
+    pub fn has_numeric_constants(&self) -> bool {
+        self.has_numeric_constants
     }
 
     /// Paths of the further libraries of effects.

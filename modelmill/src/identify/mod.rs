@@ -148,7 +148,7 @@ fn resolve_weights(
     if weights != EquationWeights::Automatic {
         return weights;
     }
-    let drives = model.drives().len();
+    let drives = model.row_names().len();
     // Squares of N and N m must not be added without weights.
     let differ = (1..drives).any(|d| model.force_unit(d) != model.force_unit(0));
     let chosen = data.iter().any(|one| one.run.prepared.decimate_chosen);
@@ -182,7 +182,7 @@ pub fn identify(
     }
     for (k, info) in infos.iter().enumerate() {
         if model.is_known(k) {
-            parameters.insert(k, known_parameter(info, model.nominal[k]));
+            parameters.insert(k, known_parameter(info, model.values[k]));
         }
     }
     // Notes need all parameters, in the order of the model.
@@ -234,7 +234,7 @@ pub fn identify(
         notes,
         repeats,
         by_rate: Vec::new(),
-        has_nominal: (0..model.base.len()).any(|k| model.has_nominal(k)),
+        has_nominal: (0..model.base.len()).any(|k| model.has_values(k)),
     })
 }
 
@@ -393,7 +393,7 @@ fn both_figures(
         figures.rows = compare::figures_of_rows(model, data, &forces)?;
         Ok::<_, Error>(figures)
     };
-    Ok((figures_of(values)?, figures_of(&model.nominal)?))
+    Ok((figures_of(values)?, figures_of(&model.values)?))
 }
 
 impl Identification {

@@ -75,8 +75,8 @@ pub fn identify(
             model.path
         )));
     }
-    let known: Vec<(usize, f64)> = known.into_iter().map(|k| (k, model.nominal[k])).collect();
-    let nominal: Vec<f64> = unknown.iter().map(|k| model.nominal[*k]).collect();
+    let known: Vec<(usize, f64)> = known.into_iter().map(|k| (k, model.values[k])).collect();
+    let nominal: Vec<f64> = unknown.iter().map(|k| model.values[*k]).collect();
     let samples: usize = data.iter().map(RecordingSegment::samples).sum();
     // Each segment becomes a source of rows.
     let mut runs = data
@@ -96,7 +96,7 @@ pub fn identify(
         for run in &mut runs {
             run.keep_if_small(job)?;
         }
-        let channels = model.drives().len();
+        let channels = model.row_names().len();
         // The estimator requests the rows in several passes.
         let show = |visit: &mut RowVisitor<'_>| -> Outcome {
             runs.iter().try_for_each(|run| run.visit_rows::<Error>(job, visit))
@@ -155,7 +155,7 @@ fn check_equation_count(
             .map(|one| one.run.file.as_str())
             .collect::<Vec<_>>()
             .join(", "),
-        count(equations / model.drives().len().max(1), "sample", "samples"),
+        count(equations / model.row_names().len().max(1), "sample", "samples"),
         count(equations, "equation", "equations"),
         count(unknown, "unknown base parameter", "unknown base parameters"),
         if data.iter().any(|one| one.decimation() > 1) {
@@ -215,7 +215,7 @@ impl<'a> RegressionRows<'a> {
         unknown: &'a [usize],
         weights: EquationWeights,
     ) -> Outcome<Self> {
-        let drives = model.drives();
+        let drives = model.row_names();
         // Weights from variances need a variance for every drive.
         let spread = if weights == EquationWeights::Variance {
             let Some(variance) = &data.variance else {
@@ -256,7 +256,7 @@ impl<'a> RegressionRows<'a> {
     /// Computes all rows once and keeps them, if they are few enough or decimated: decimation needs neighbouring rows.
     fn keep_if_small(&mut self, job: &JobHandle) -> Outcome {
         // Without decimation, rows that are too many are computed again in each pass.
-        let width = self.width() * self.model.drives().len();
+        let width = self.width() * self.model.row_names().len();
         let decimation = self.data.decimation();
         let samples = self.data.samples();
         if decimation == 1 && samples * width > KEPT {
@@ -314,7 +314,7 @@ impl<'a> RegressionRows<'a> {
             let rows = w.len() / self.width();
             self.visit_unknown(w, row, visit)?;
             row += rows;
-            job.add(rows / self.model.drives().len().max(1));
+            job.add(rows / self.model.row_names().len().max(1));
             Ok(())
         })
     }
@@ -351,7 +351,7 @@ impl<'a> RegressionRows<'a> {
     /// recording.
     fn blocks<E: From<Error>>(&self, visit: &mut dyn FnMut(&[f64]) -> Result<(), E>) -> Result<(), E> {
         let evaluator = ModelEvaluator::new(&self.model.derivation);
-        let drives = self.model.drives().len();
+        let drives = self.model.row_names().len();
         let width = self.width();
         let (mut rows, mut start) = (Vec::new(), 0);
         self.data.for_each_block(self.model, |states| {

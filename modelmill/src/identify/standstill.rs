@@ -16,7 +16,7 @@ use crate::text::table::count;
 /// `part` is the fraction of a drive's maximum rate below which it is at standstill. Fails when all equations of a
 /// drive would be excluded.
 pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], part: f64) -> Outcome {
-    let drives = model.drives();
+    let drives = model.row_names();
     // Rates at the decimated samples, since these are the equations of the fit.
     let rates: Vec<Vec<Vec<f64>>> = data
         .iter()

@@ -37,7 +37,7 @@ pub struct BaseValueChange {
 fn changed_values(before: &Model, after: &Model) -> Vec<BaseValueChange> {
     let value = |model: &Model, retained: &str| {
         let k = model.base.iter().position(|base| base.retained == retained)?;
-        model.has_nominal(k).then(|| model.nominal[k])
+        model.has_values(k).then(|| model.values[k])
     };
     let is_new = |base: &&BaseParameterEntry| before.base.iter().all(|other| other.retained != base.retained);
     (before.base.iter().chain(after.base.iter().filter(is_new)))

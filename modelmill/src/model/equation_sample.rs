@@ -37,7 +37,7 @@ impl Model {
                 positions: nominal.zip(signed(0)).map(|(q, x)| q + distance * x).collect(),
                 rates: signed(n).map(|x| RATE * x).collect(),
                 accelerations: signed(2 * n).map(|x| ACCELERATION * x).collect(),
-                loads: (0..self.drives().len()).map(|k| 1.0 + spread(k)).collect(),
+                loads: (0..self.row_names().len()).map(|k| 1.0 + spread(k)).collect(),
                 forces: Vec::new(),
             };
             let found = forces_at(&evaluator, &sample)?;
@@ -55,7 +55,7 @@ impl Model {
             let file = file.to_owned();
             Err(FitFileError { file, fault }.into())
         };
-        let (n, drives) = (self.active_coordinates().len(), self.drives());
+        let (n, drives) = (self.active_coordinates().len(), self.row_names());
         let motion = [&sample.positions, &sample.rates, &sample.accelerations];
         let forces = [&sample.loads, &sample.forces];
         if motion.iter().any(|values| values.len() != n) || forces.iter().any(|values| values.len() != drives.len()) {

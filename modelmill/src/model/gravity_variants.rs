@@ -65,11 +65,11 @@ mod tests {
         let model = Model::open("../model-spec/models/two_link.toml").unwrap();
         let side = [9.81, 0.0, 0.0];
         let first = model.with_gravity(side).unwrap();
-        let values: Vec<f64> = model.nominal.iter().map(|value| 2.0 * value).collect();
+        let values: Vec<f64> = model.values.iter().map(|value| 2.0 * value).collect();
         let second = model.with_values(&values).with_gravity(side).unwrap();
         assert!(Arc::ptr_eq(&first.derivation, &second.derivation));
         assert_eq!(second.gravity().map(f64::to_bits), side.map(f64::to_bits));
-        assert_ne!(first.nominal, second.nominal);
+        assert_ne!(first.values, second.values);
         // The latest directions are kept, however many there are.
         for k in 0..=MOST_KEPT {
             let tilted = [0.1 * (k as f64 + 1.0), 9.81, 0.0];

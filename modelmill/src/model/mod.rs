@@ -57,7 +57,7 @@ pub struct Model {
     /// The values of the base parameters that the model uses, in their units and in the order of `base`. Each is the
     /// identified value if the file or a fit has one ([`Model::with_fit`], [`Model::is_identified`]); otherwise it is
     /// computed from the nominal values of the file.
-    pub nominal: Vec<f64>,
+    pub values: Vec<f64>,
     /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
     pub notes: Vec<RecordingNote>,
     /// Covariance of the values in `nominal`, if they come from a fit that has one.
@@ -122,7 +122,7 @@ impl Host {
     ///
     /// Fails with the reason why the equations cannot be derived.
     pub fn derive(&self, path: &str, mut loaded: LoadedModel) -> Outcome<Model> {
-        if self.is_at_values() {
+        if self.has_numeric_constants() {
             loaded.mechanism = loaded.mechanism.with_numeric_constants();
         }
         let mechanism = &loaded.mechanism;
@@ -166,7 +166,7 @@ impl Host {
             name: stem.map_or_else(|| mechanism.name.clone(), |s| s.to_string_lossy().into_owned()),
             path: path.to_owned(),
             base: base(&derivation),
-            nominal: derivation.nominal_base_values(),
+            values: derivation.nominal_base_values(),
             covariance: None,
             identified,
             signs: signs(mechanism, &loaded.kinds),
@@ -369,7 +369,7 @@ impl Model {
                 .sum::<f64>();
             (squares > 0.0).then(|| ParameterPrior {
                 parameter: i,
-                value: self.nominal[*k],
+                value: self.values[*k],
                 std: sigma * squares.sqrt(),
             })
         });
@@ -450,22 +450,22 @@ impl Model {
             .collect()
     }
 
-    /// Names of the regressor rows, in their order. Each row is a drive, or a degree of freedom without an actuator
-    /// ([`Model::undriven_rows`]). With more drives than degrees of freedom, each row is a degree of freedom, and the
+    /// Names of the regressor rows, in their order. Each row is that of a drive, or of a degree of freedom without an
+    /// actuator ([`Model::undriven_rows`]). With more drives than degrees of freedom, each row is a degree of freedom, and the
     /// drives are in [`ModelSummary::drives`](crate::model::ModelSummary::drives).
-    pub fn drives(&self) -> Vec<String> {
+    pub fn row_names(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         drives.map(|d| d.name.clone()).collect()
     }
 
-    /// Names of the regressor rows without an actuator, a subset of [`Model::drives`], which lists all rows.
+    /// Names of the regressor rows without an actuator, a subset of [`Model::row_names`], which lists all rows.
     pub fn undriven_rows(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         let undriven = drives.filter(|drive| !drive.is_driven);
         undriven.map(|drive| drive.name.clone()).collect()
     }
 
-    /// Unit of the force of a drive: `N` or `N m`. `drive` is an index into [`Model::drives`].
+    /// Unit of the force of a drive: `N` or `N m`. `drive` is an index into [`Model::row_names`].
     pub fn force_unit(&self, drive: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;
         mechanism.drives[drive].kind.force_unit(&mechanism.coordinates)
@@ -480,7 +480,7 @@ impl Model {
                 name: base.name.clone(),
                 expression: base.expression.clone(),
                 unit: base.unit.clone(),
-                nominal: self.has_nominal(k).then(|| self.nominal[k]),
+                nominal: self.has_values(k).then(|| self.values[k]),
             })
             .collect()
     }
@@ -503,7 +503,7 @@ impl Model {
     pub fn with_values(&self, values: &[f64]) -> Self {
         assert_eq!(values.len(), self.base.len(), "one value per base parameter");
         Self {
-            nominal: values.to_vec(),
+            values: values.to_vec(),
             covariance: None,
             identified: vec![true; values.len()],
             ..self.clone()
@@ -541,7 +541,7 @@ impl Model {
         for (k, base) in self.base.iter().enumerate() {
             let same = other.base.iter().position(|one| one.expression == base.expression);
             if let Some(i) = same.filter(|i| other.identified[*i]) {
-                self.nominal[k] = other.nominal[i];
+                self.values[k] = other.values[i];
                 self.identified[k] = true;
             }
         }
@@ -562,7 +562,7 @@ impl Model {
 
     /// Whether a base parameter has a nominal value: it was identified, or the file gives values for all factors of at
     /// least one of its products. These values may be zero.
-    pub fn has_nominal(&self, k: usize) -> bool {
+    pub fn has_values(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;
         }

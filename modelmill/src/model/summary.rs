@@ -91,7 +91,7 @@ pub struct ModelSummary {
     pub passive: Vec<String>,
     /// Names of the loops.
     pub loops: Vec<String>,
-    /// Names of the drives of the model file. [`Model::drives`] has the rows of the regressor instead. The two differ
+    /// Names of the drives of the model file. [`Model::row_names`] has the rows of the regressor instead. The two differ
     /// if a degree of freedom has no drive, or if there are more drives than degrees of freedom, as in a cable robot.
     pub drives: Vec<String>,
     /// Names of the regressor rows without an actuator.

@@ -21,7 +21,7 @@ impl Model {
     /// The nominal values. Base parameters for which the file gives none are 0, which a note states.
     pub fn nominal_values(&self) -> BaseParameterValues {
         let without: Vec<&str> = (0..self.base.len())
-            .filter(|k| !self.has_nominal(*k))
+            .filter(|k| !self.has_values(*k))
             .map(|k| self.base[k].expression.as_str())
             .collect();
         let mut notes = Vec::new();
@@ -33,7 +33,7 @@ impl Model {
             )));
         }
         BaseParameterValues {
-            values: self.nominal.clone(),
+            values: self.values.clone(),
             covariance: None,
             notes,
         }

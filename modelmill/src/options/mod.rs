@@ -26,7 +26,7 @@ pub struct OptionDeclaration<T: 'static> {
     /// What stands for its value in help, such as `HZ`; empty for a switch.
     pub placeholder: &'static str,
     /// What it does. `{name}` refers to an option of the same list, `{name=value}` to an option with a value;
-    /// [`OptionDeclaration::spell_help`] replaces them.
+    /// [`OptionDeclaration::format_help`] replaces them.
     pub help: &'static str,
     /// Names of options that must not be given together with it.
     pub excludes: &'static [&'static str],
@@ -202,17 +202,17 @@ impl<T> OptionDeclaration<T> {
         value.ok_or_else(|| self.expected())
     }
 
-    /// The help text, in which `spell` writes each reference to another option. It gets the name of the option, and a
+    /// The help text, in which `write_reference` writes each reference to another option. It gets the name of the option, and a
     /// value if one is recommended.
-    pub fn spell_help(&self, spell: &dyn Fn(&str, Option<&str>) -> String) -> String {
-        spell_references(self.help, spell)
+    pub fn format_help(&self, write_reference: &dyn Fn(&str, Option<&str>) -> String) -> String {
+        replace_references(self.help, write_reference)
     }
 }
 
 impl<T> ChoiceValue<T> {
-    /// The help text, as [`OptionDeclaration::spell_help`] writes it.
-    pub fn spell_help(&self, spell: &dyn Fn(&str, Option<&str>) -> String) -> String {
-        spell_references(self.help, spell)
+    /// The help text, as [`OptionDeclaration::format_help`] writes it.
+    pub fn format_help(&self, write_reference: &dyn Fn(&str, Option<&str>) -> String) -> String {
+        replace_references(self.help, write_reference)
     }
 }
 
@@ -240,20 +240,20 @@ pub fn find_flag(name: &str) -> Option<&'static str> {
     reading.or_else(|| find_declaration::<EstimatorOptions>(name).map(|one| one.flag))
 }
 
-/// A text with each `{name}` or `{name=value}` as `spell` spells it.
-fn spell_references(text: &str, spell: &dyn Fn(&str, Option<&str>) -> String) -> String {
+/// A text with each `{name}` or `{name=value}` as `write_reference` writes it.
+fn replace_references(text: &str, write_reference: &dyn Fn(&str, Option<&str>) -> String) -> String {
     let mut pieces = text.split('{');
-    let mut spelled = pieces.next().unwrap_or_default().to_owned();
+    let mut written = pieces.next().unwrap_or_default().to_owned();
     for piece in pieces {
         let (reference, rest) = piece.split_once('}').unwrap_or((piece, ""));
         let (name, value) = match reference.split_once('=') {
             Some((name, value)) => (name, Some(value)),
             None => (reference, None),
         };
-        spelled.push_str(&spell(name, value));
-        spelled.push_str(rest);
+        written.push_str(&write_reference(name, value));
+        written.push_str(rest);
     }
-    spelled
+    written
 }
 
 /// Reads `NAME=COLUMN`: a name of the model and an expression of columns.

@@ -4,14 +4,14 @@ use serde_json::{Value, json};
 
 use crate::compare::ModelComparison;
 use crate::error::{Error, Outcome};
-use crate::print::{RemedySpelling, notes, tables};
+use crate::print::{RemedyWording, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelComparison {
     /// Errors, regions, dependence on the rates and notes as one JSON object; `parameters` is `nominal` or the file that
     /// the values come from.
-    pub fn json(&self, parameters: &str, spelling: &dyn RemedySpelling) -> Outcome<Value> {
+    pub fn json(&self, parameters: &str, wording: &dyn RemedyWording) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
         let figures = serde_json::to_value(&self.figures);
         let figures = figures.map_err(|error| Error::input(error.to_string()))?;
@@ -20,15 +20,15 @@ impl ModelComparison {
             object.extend(figures.clone());
             object.insert("where".to_owned(), json!(self.places.regions));
             object.insert("by_rate".to_owned(), json!(self.places.by_rate));
-            object.insert("data".to_owned(), notes(&self.notes, spelling));
-            let next = self.next_step().map(|step| step.spell(spelling));
+            object.insert("data".to_owned(), notes(&self.notes, wording));
+            let next = self.next_step().map(|step| step.format_for(wording));
             object.insert("next".to_owned(), json!(next));
         }
         Ok(object)
     }
 
     /// The comparison as text: figures of each drive, the regions of the error, and how it depends on the rates.
-    pub fn text(&self, parameters: &str, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text(&self, parameters: &str, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let mut lines = vec![style.bold(&format!(
             "{} with {parameters} parameters on {}",
             self.model,
@@ -49,7 +49,7 @@ impl ModelComparison {
         }
         if let Some(step) = self.next_step() {
             lines.push(String::new());
-            lines.push(step.spell(spelling));
+            lines.push(step.format_for(wording));
         }
         lines.join("\n")
     }

@@ -145,7 +145,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     // The explanations of the library.
     for (head, text) in [
         ("what it is", &kind.explains),
-        ("what it can be confused with", &kind.doubles),
+        ("what it can be confused with", &kind.confused_with),
     ] {
         if !text.is_empty() {
             lines.push(String::new());
@@ -266,7 +266,7 @@ fn kind_json(kind: &EffectKind) -> Value {
         "constants": constants.collect::<Vec<_>>(),
         "says": kind.says,
         "explains": kind.explains,
-        "doubles": kind.doubles,
+        "doubles": kind.confused_with,
         "own": kind.is_own,
     })
 }

@@ -32,7 +32,7 @@ fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
 /// weights: `residual_scale` is the noise of each drive (N or N m). `prior`, `essential`, `physical` and
 /// `instruments` are there if the option was used.
 pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOptions) -> Value {
-    let drives = model.drives();
+    let drives = model.row_names();
     // Lists of values per drive become objects with the names of the drives.
     let by_drive = |values: &[f64]| -> Value {
         drives
@@ -141,7 +141,7 @@ pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[Parameter
         let scales: Vec<String> = weighting
             .scales
             .iter()
-            .zip(model.drives())
+            .zip(model.row_names())
             .enumerate()
             .map(|(d, (s, drive))| format!("{drive} {} {}", significant(*s, 3), model.force_unit(d)))
             .collect();

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use crate::excite::HarmonicsResult;
 use crate::excite::plant::used_fraction;
 use crate::excite::{ExcitationResult, SeparationResult};
-use crate::print::RemedySpelling;
+use crate::print::RemedyWording;
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
@@ -77,7 +77,7 @@ impl ExcitationResult {
     }
 
     /// The trajectory as text: quality first, then the use of its limits.
-    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text(&self, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let found = &self.found;
         // The head has what was asked for.
         let mut lines = vec![style.bold(&format!(
@@ -88,7 +88,7 @@ impl ExcitationResult {
         ))];
         // The goal of the search decides which figures are printed.
         if let Some(separated) = &self.separated {
-            lines.extend(separated.text(found.evaluations, found.feasible_starts, spelling));
+            lines.extend(separated.text(found.evaluations, found.feasible_starts, wording));
         } else {
             lines.extend(self.conditions());
         }

@@ -17,7 +17,7 @@ use crate::diagnose::{
     is_common_clock, words,
 };
 use crate::faults::is_named_by_verdict;
-use crate::print::{OptionName, Remedy, StepSpelling, note_answers};
+use crate::print::{OptionName, Remedy, StepWording, note_answers};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, all_digits, number, percent, significant, table};
 
@@ -27,14 +27,14 @@ const MOST_CANDIDATES: usize = 6;
 const NAMED_LEAST_SHARE: f64 = 0.01;
 
 impl DiagnosisFindings {
-    /// All findings as one JSON object; `spelling` writes commands or calls for its reader. Its fields are those of the schema
+    /// All findings as one JSON object; `wording` writes commands or calls for its reader. Its fields are those of the schema
     /// `schema/diagnose.schema.json`.
-    pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
-        to_json(&self.answer(spelling))
+    pub fn json(&self, wording: &dyn StepWording) -> Value {
+        to_json(&self.answer(wording))
     }
 
     /// All findings as the answer of `diagnose`.
-    fn answer(&self, spelling: &dyn StepSpelling) -> DiagnosisAnswer {
+    fn answer(&self, wording: &dyn StepWording) -> DiagnosisAnswer {
         let diagnosis = &self.diagnosis;
         let (model, channels) = (&self.before.model, self.channels());
         let candidates = diagnosis.candidates.iter().map(|one| CandidateAnswer {
@@ -83,19 +83,19 @@ impl DiagnosisFindings {
                 .iter()
                 .map(|one| self.disturbance_answer(one))
                 .collect(),
-            corrected: self.corrected.iter().map(|fault| fault.answer(spelling)).collect(),
-            unresolved: self.unresolved.iter().map(|fault| fault.answer(spelling)).collect(),
+            corrected: self.corrected.iter().map(|fault| fault.answer(wording)).collect(),
+            unresolved: self.unresolved.iter().map(|fault| fault.answer(wording)).collect(),
             steps: diagnosis.steps.iter().map(step_answer).collect(),
-            effects: self.effect_answers(&self.missing, spelling),
+            effects: self.effect_answers(&self.missing, wording),
             geometry_alternatives: self.geometry_answers(),
-            possible: self.effect_answers(&self.possible, spelling),
+            possible: self.effect_answers(&self.possible, wording),
             candidates: candidates.collect(),
             untold: undecided.collect(),
-            laws: laws::law_answers(&self.laws, model, spelling),
+            laws: laws::law_answers(&self.laws, model, wording),
             parameters_off_nominal: off_nominal.collect(),
             unexplained: unexplained.collect(),
             follows_time: self.time_residual_answers(),
-            data: note_answers(&self.notes, spelling),
+            data: note_answers(&self.notes, wording),
             regions: self.regions.clone(),
             with_nominal_parameters: with_nominal,
         }
@@ -103,7 +103,7 @@ impl DiagnosisFindings {
 
     /// Missing effects with the motion that would separate them from their alternatives. Kinds and places have the names of
     /// the model file.
-    fn effect_answers(&self, effects: &[MissingEffect], spelling: &dyn StepSpelling) -> Vec<MissingEffectAnswer> {
+    fn effect_answers(&self, effects: &[MissingEffect], wording: &dyn StepWording) -> Vec<MissingEffectAnswer> {
         let model = &self.before.model;
         let answer = |missing: &MissingEffect| {
             let separation = missing.separation.as_ref();
@@ -116,7 +116,7 @@ impl DiagnosisFindings {
                 indistinguishable_from: missing.indistinguishable_from.clone(),
                 shared_with: missing.shared_with.clone(),
                 separate_by: missing.separating_experiment.clone(),
-                separate_command: separation.and_then(|proposal| spelling.spell_separation(model, proposal)),
+                separate_command: separation.and_then(|proposal| wording.format_separation(model, proposal)),
             }
         };
         effects.iter().map(answer).collect()
@@ -200,7 +200,7 @@ impl DiagnosisFindings {
     }
 
     /// The findings as lines of text, the verdict first.
-    pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
+    pub fn text(&self, style: TerminalStyle, wording: &dyn StepWording) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let verdict = self.verdict_text();
         let mut lines: Vec<String> = (wrap_words(&verdict, 100).iter())
@@ -227,30 +227,30 @@ impl DiagnosisFindings {
             ],
             &rows,
         ));
-        self.missing_text(style, spelling, &mut lines);
+        self.missing_text(style, wording, &mut lines);
         self.sums_text(&mut lines);
         self.geometry_alternatives_text(style, &mut lines);
         self.possible_text(style, &mut lines);
         self.disturbances_text(style, &mut lines);
         self.regions_text(style, &mut lines);
-        lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
+        lines.extend(laws::text(&self.laws, &self.before.model, style, wording));
         self.refused_text(style, &mut lines);
         self.undecided_text(style, &mut lines);
-        self.off_nominal_text(style, spelling, &mut lines);
+        self.off_nominal_text(style, wording, &mut lines);
         // Entries to add first, then advice for what a model file cannot contain. Steps are commands or calls,
         // depending on the reader.
         let at_fault = self.corrected.iter().chain(&self.unresolved);
         let mut next: Vec<String> = at_fault
-            .map(|fault| format!("{}: {}.", fault.advice_heading(), fault.advice.spell(spelling)))
+            .map(|fault| format!("{}: {}.", fault.advice_heading(), fault.advice.format_for(wording)))
             .collect();
         // Steps that were done at once are no next steps.
-        if !spelling.has_added_effects() {
+        if !wording.has_added_effects() {
             let entries = self.entries_to_add();
             let steps = entries.iter();
-            next.extend(steps.map(|entry| spelling.spell_effect(&self.before.model, entry)));
+            next.extend(steps.map(|entry| wording.format_effect(&self.before.model, entry)));
             // A model is completed only once the faults are corrected.
             if entries.len() > 1 && self.corrected.is_empty() {
-                next.push(format!("{}.", spelling.spell_completion()));
+                next.push(format!("{}.", wording.format_completion()));
             }
         }
         next.extend(self.further_action().map(str::to_owned));
@@ -263,7 +263,7 @@ impl DiagnosisFindings {
         if let Some(says) = self.after.refusal() {
             lines.push(format!(
                 "  The model with the added effects cannot be built: {}",
-                says.spell(spelling)
+                says.format_for(wording)
             ));
         }
         lines
@@ -335,7 +335,7 @@ impl DiagnosisFindings {
                 ("noise or rounding", ColumnAlignment::Right),
                 ("varies with time only", ColumnAlignment::Right),
                 ("model error", ColumnAlignment::Right),
-                ("subtracted before the fit", ColumnAlignment::Right),
+                ("disturbances, subtracted before the fit", ColumnAlignment::Right),
             ],
             &rows,
         ));
@@ -343,12 +343,12 @@ impl DiagnosisFindings {
 
     /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
     /// means and how to separate it are printed once, at its first place.
-    fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+    fn missing_text(&self, style: TerminalStyle, wording: &dyn StepWording, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Missing effects"));
+        lines.push(style.bold("Missing effects (estimate ± one standard deviation)"));
         // Each kind is explained at its first place only.
         let mut explained: Vec<&str> = Vec::new();
         // So is the experiment that distinguishes it from its alternatives.
@@ -390,7 +390,7 @@ impl DiagnosisFindings {
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(proposal) = &found.separation
-                    && let Some(command) = spelling.spell_separation(&self.before.model, proposal)
+                    && let Some(command) = wording.format_separation(&self.before.model, proposal)
                 {
                     let says = format!(
                         "To plan a motion that distinguishes {} from {}:",
@@ -519,7 +519,7 @@ impl DiagnosisFindings {
     }
 
     /// Base parameters whose estimates differ from the nominal values of the file.
-    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+    fn off_nominal_text(&self, style: TerminalStyle, wording: &dyn StepWording, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
         }
@@ -572,7 +572,7 @@ impl DiagnosisFindings {
             lines.push(format!("  {says}"));
             lines.extend(further.iter().map(|says| format!("    {says}")));
         }
-        let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
+        let fix_parameters = Remedy::option(OptionName::Held).format_for(wording);
         lines.push(format!(
             "  To diagnose with all parameters fixed at their nominal values, use {fix_parameters}."
         ));

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Outcome};
 use crate::identify::Identification;
 use crate::model::Model;
-use crate::print::{RemedySpelling, estimation, notes, tables};
+use crate::print::{RemedyWording, estimation, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::{count, significant};
 
@@ -15,13 +15,13 @@ impl Identification {
     /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
     ///
     /// Fails when the fit cannot be written as JSON.
-    pub fn json(&self, model: &Model, spelling: &dyn RemedySpelling) -> Outcome<Value> {
+    pub fn json(&self, model: &Model, wording: &dyn RemedyWording) -> Outcome<Value> {
         let value = serde_json::to_value(&self.fit);
         let mut value = value.map_err(|error| Error::input(error.to_string()))?;
         if let Some(object) = value.as_object_mut() {
-            // Notes contain remedies, which are spelled for the reader.
+            // Notes contain remedies, which are written for the reader.
             if let Some(data) = object.get_mut("data") {
-                *data = notes(&self.fit.data, spelling);
+                *data = notes(&self.fit.data, wording);
             }
             object.insert(
                 "nominal".to_owned(),
@@ -33,7 +33,7 @@ impl Identification {
                 estimation::json(model, &self.found, &self.options),
             );
             object.insert("by_rate".to_owned(), json!(self.by_rate));
-            object.insert("next".to_owned(), json!(self.next_step().spell(spelling)));
+            object.insert("next".to_owned(), json!(self.next_step().format_for(wording)));
             // Periods exist for periodic recordings only.
             if !self.repeats.is_empty() {
                 let repeats = self
@@ -48,7 +48,7 @@ impl Identification {
     }
 
     /// The result as text: parameters, quality of the estimate, errors, and the next step.
-    pub fn text(&self, model: &Model, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text(&self, model: &Model, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let fit = &self.fit;
         let estimator = estimation::text(model, &self.found, &model.parameter_infos());
         // Parameters known from the file are not counted as identified.
@@ -89,7 +89,7 @@ impl Identification {
         }
         lines.extend(tables::figures(&figures));
         lines.push(String::new());
-        lines.push(self.next_step().spell(spelling));
+        lines.push(self.next_step().format_for(wording));
         lines.join("\n")
     }
 }

@@ -5,7 +5,7 @@ use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution};
 use serde_json::{Map, Value, json};
 
 use crate::interpret::InterpretationResult;
-use crate::print::{OptionName, Remedy, RemedySpelling};
+use crate::print::{OptionName, Remedy, RemedyWording};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
@@ -70,7 +70,7 @@ impl InterpretationResult {
     }
 
     /// The solutions as text, each as a table, after a headline with the method.
-    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text(&self, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let solutions = self.solutions();
         let unknowns = count(self.unknown.len(), "unknown parameter", "unknown parameters");
         let equations = count(self.used.len(), "base parameter", "base parameters");
@@ -106,7 +106,7 @@ impl InterpretationResult {
                 "  Fix one parameter of each line at its nominal value: leave it out of {}.",
                 Remedy::option(OptionName::Unknown)
             );
-            lines.push(how.spell(spelling));
+            lines.push(how.format_for(wording));
         }
         // Exact equations may have complex solutions only.
         if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {

@@ -7,7 +7,7 @@ use super::findings::{estimate_answers, values_text};
 use crate::answers::{LawAnswer, LawHypothesisAnswer};
 use crate::diagnose::{LawHypothesis, ProposedLaw, words};
 use crate::model::Model;
-use crate::print::StepSpelling;
+use crate::print::StepWording;
 use crate::text::TerminalStyle;
 use crate::text::table::percent;
 
@@ -23,14 +23,14 @@ pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, 
 pub(super) fn law_answers(
     laws: &[LawHypothesis],
     model: &Model,
-    spelling: &dyn StepSpelling,
+    wording: &dyn StepWording,
 ) -> Vec<LawHypothesisAnswer> {
     let one = |hypothesis: &LawHypothesis| {
         let ties = hypothesis.near_ties.iter();
         LawHypothesisAnswer {
-            law: law_answer(&hypothesis.law, model, spelling),
+            law: law_answer(&hypothesis.law, model, wording),
             near_ties: ties.clone().map(ProposedLaw::label).collect(),
-            ties: ties.map(|tie| law_answer(tie, model, spelling)).collect(),
+            ties: ties.map(|tie| law_answer(tie, model, wording)).collect(),
             says: HYPOTHESIS.to_owned(),
         }
     };
@@ -38,7 +38,7 @@ pub(super) fn law_answers(
 }
 
 /// A law with its entry for a library and the step that adds it.
-fn law_answer(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> LawAnswer {
+fn law_answer(law: &ProposedLaw, model: &Model, wording: &dyn StepWording) -> LawAnswer {
     let entry = law.entry.as_ref();
     LawAnswer {
         expression: law.expression.clone(),
@@ -50,7 +50,7 @@ fn law_answer(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> 
         entry: entry.map(|entry| entry.text.clone()),
         kind: entry.map(|entry| entry.effect.kind.clone()),
         places: entry.map(|entry| entry.effect.at.clone()),
-        command: entry.map(|entry| spelling.spell_effect_of_library(model, &entry.effect, LIBRARY)),
+        command: entry.map(|entry| wording.format_effect_of_library(model, &entry.effect, LIBRARY)),
     }
 }
 
@@ -59,7 +59,7 @@ pub(super) fn text(
     laws: &[LawHypothesis],
     model: &Model,
     style: TerminalStyle,
-    spelling: &dyn StepSpelling,
+    wording: &dyn StepWording,
 ) -> Vec<String> {
     let mut lines = Vec::new();
     if laws.is_empty() {
@@ -91,7 +91,7 @@ pub(super) fn text(
                 lines.push(format!("    Append to the library file {LIBRARY}:"));
                 lines.extend(entry.text.lines().map(|line| style.dim(&format!("      {line}"))));
                 lines.push("    To add the law to the model:".to_owned());
-                let command = spelling.spell_effect_of_library(model, &entry.effect, LIBRARY);
+                let command = wording.format_effect_of_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
             }
             None => {

@@ -22,11 +22,11 @@ mod reduction;
 mod rig_contents;
 pub(crate) mod runs;
 mod servo;
-mod spelling;
 mod summary;
 pub mod tables;
 mod variants;
 mod verification;
+mod wording;
 
 use modelmill_identify::RecordingNote;
 use serde_json::Value;
@@ -34,22 +34,20 @@ use serde_json::Value;
 use crate::answers::NoteAnswer;
 
 pub(crate) use findings::values_text;
-pub use spelling::{
-    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling, StepSpelling,
-};
 pub use summary::{faults, refusal, warnings};
 pub use verification::{VERIFICATION_SCHEMA, VerificationContext};
+pub use wording::{CommandName, Message, OptionName, OptionSetting, Remedy, RemedyWording, RustWording, StepWording};
 
 /// Notes of an answer.
-pub(crate) fn note_answers(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Vec<NoteAnswer> {
+pub(crate) fn note_answers(notes: &[RecordingNote], wording: &dyn RemedyWording) -> Vec<NoteAnswer> {
     let answer = |note: &RecordingNote| NoteAnswer {
         severity: note.severity,
-        says: note.says.spell(spelling),
+        says: note.says.format_for(wording),
     };
     notes.iter().map(answer).collect()
 }
 
 /// Notes as JSON.
-pub(crate) fn notes(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Value {
-    notes.iter().map(|note| note.json(spelling)).collect()
+pub(crate) fn notes(notes: &[RecordingNote], wording: &dyn RemedyWording) -> Value {
+    notes.iter().map(|note| note.json(wording)).collect()
 }

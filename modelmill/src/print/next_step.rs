@@ -277,7 +277,7 @@ impl Identification {
 
 #[cfg(test)]
 mod tests {
-    use modelmill_boundary::text::LibrarySpelling;
+    use modelmill_boundary::text::RustWording;
     use serde_json::json;
 
     use super::*;
@@ -322,7 +322,7 @@ mod tests {
             suspect: None,
         };
         let step = look.diagnosis_step().or_else(|| look.identification_step());
-        step.map(|step| step.spell(&LibrarySpelling))
+        step.map(|step| step.format_for(&RustWording))
     }
 
     /// A fault of the recording is corrected before anything else, whatever the residual looks like.
@@ -346,7 +346,7 @@ mod tests {
             correlations: &[0.99, 0.0],
             suspect: Some(&fault),
         };
-        let text = look.correction_step().expect("a step").spell(&LibrarySpelling);
+        let text = look.correction_step().expect("a step").format_for(&RustWording);
         assert_eq!(
             text,
             "All figures are doubtful: in run.csv the force of a has the wrong sign. Next: turn it, then run \
@@ -365,7 +365,7 @@ mod tests {
                 correlations: &[],
                 suspect: None,
             };
-            look.unit_step().map(|step| step.spell(&LibrarySpelling))
+            look.unit_step().map(|step| step.format_for(&RustWording))
         };
         assert_eq!(look(3.0), None);
         let text = look(9e4).expect("a step");

@@ -10,7 +10,7 @@ use crate::answers::{
     RunAnswer, RunChangeAnswer, RunValueAnswer, RunValuesAnswer, RunsAnswer, SharedFitAnswer, UndecidedDriveAnswer,
     UnreadRunAnswer, to_json,
 };
-use crate::print::RemedySpelling;
+use crate::print::RemedyWording;
 use crate::runs::{
     ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunVerdict, RunsComparison, SharedFit,
     UndecidedDrive, UndecidedReason,
@@ -20,12 +20,12 @@ use crate::text::table::{ColumnAlignment, count, percent, table, with_std};
 
 impl RunsComparison {
     /// All differences as one JSON object; its fields are those of the schema `schema/runs.schema.json`.
-    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
-        to_json(&self.answer(spelling))
+    pub fn json(&self, wording: &dyn RemedyWording) -> Value {
+        to_json(&self.answer(wording))
     }
 
     /// All differences as the answer of `runs`.
-    fn answer(&self, spelling: &dyn RemedySpelling) -> RunsAnswer {
+    fn answer(&self, wording: &dyn RemedyWording) -> RunsAnswer {
         let later = || self.runs.iter().enumerate().skip(1);
         // All figures are relative to the first run.
         let moved = later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_answer(k, *p)));
@@ -34,7 +34,7 @@ impl RunsComparison {
         let changes = all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_answer([0, k], one)));
         let unread = self.unread.iter().map(|one| UnreadRunAnswer {
             file: one.file.clone(),
-            says: one.error.spell(spelling),
+            says: one.error.format_for(wording),
         });
         // Each run with its own fit.
         let runs = self.runs.iter().enumerate().map(|(k, run)| RunAnswer {
@@ -43,7 +43,7 @@ impl RunsComparison {
             parameters: self.parameter_answers(&run.alone),
             verdict: (k > 0).then(|| run.verdict().keyword()),
             undecided: run.undecided.iter().map(undecided_answer).collect(),
-            says: (k > 0).then(|| verdict_text(run).spell(spelling)),
+            says: (k > 0).then(|| verdict_text(run).format_for(wording)),
         });
         RunsAnswer {
             model: self.model.clone(),
@@ -133,7 +133,7 @@ impl RunsComparison {
     }
 
     /// The comparison as text: permanent changes, the fit of all runs at once, and each run.
-    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text(&self, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
         };
@@ -157,17 +157,17 @@ impl RunsComparison {
             lines.extend(first.changes.iter().map(|one| format!("  {}", one.says)));
         }
         if later.len() > MOST_DETAILED_RUNS {
-            write_many_runs(later, &mut lines, style, spelling);
+            write_many_runs(later, &mut lines, style, wording);
         } else {
             for run in later {
-                self.write_run(first, run, &mut lines, style, spelling);
+                self.write_run(first, run, &mut lines, style, wording);
             }
             self.write_change_points(&mut lines, style);
         }
         // Files that could not be evaluated come last, with the reason.
         for one in &self.unread {
             lines.push(String::new());
-            let why = one.error.spell(spelling);
+            let why = one.error.format_for(wording);
             lines.push(format!("{} was not evaluated: {why}", one.file));
         }
         lines.push(String::new());
@@ -181,12 +181,12 @@ impl RunsComparison {
         run: &RunReport,
         lines: &mut Vec<String>,
         style: TerminalStyle,
-        spelling: &dyn RemedySpelling,
+        wording: &dyn RemedyWording,
     ) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);
-        let verdict = verdict_text(run).spell(spelling);
+        let verdict = verdict_text(run).format_for(wording);
         lines.extend((!verdict.is_empty()).then(|| format!("  {verdict}")));
         if !run.moved.is_empty() {
             lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
@@ -387,7 +387,7 @@ fn write_changes(changes: &[RunChange], lines: &mut Vec<String>) {
 }
 
 /// Many runs: only those with another verdict than "no change" are listed, the others are counted.
-fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle, spelling: &dyn RemedySpelling) {
+fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle, wording: &dyn RemedyWording) {
     let is_quiet = |run: &&RunReport| run.changes.is_empty() && run.verdict() == RunVerdict::Unchanged;
     let unchanged = later.iter().filter(is_quiet).count();
     lines.push(String::new());
@@ -398,7 +398,7 @@ fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: Terminal
     for run in later.iter().filter(|run| !is_quiet(run)) {
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);
-        let verdict = verdict_text(run).spell(spelling);
+        let verdict = verdict_text(run).format_for(wording);
         lines.extend((!verdict.is_empty()).then(|| format!("  {verdict}")));
     }
 }
@@ -495,7 +495,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::print::LibrarySpelling;
+    use crate::print::RustWording;
     use crate::runs::ChangeEstimate;
 
     /// A report with given numbers of moved parameters and of undecided drives of two.
@@ -536,7 +536,7 @@ mod tests {
                 for changes in [Vec::new(), vec![offset.clone()]] {
                     let is_changed = !changes.is_empty();
                     let one = report(moved, undecided, changes);
-                    let says = verdict_text(&one).spell(&LibrarySpelling);
+                    let says = verdict_text(&one).format_for(&RustWording);
                     let denies = says.contains("No change found") || says.contains("No other change found");
                     assert_eq!(denies, !is_changed && moved == 0 && undecided < 2, "{says}");
                     let is_unknown = !is_changed && undecided == 2;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::print::{RemedySpelling, notes};
+use crate::print::{RemedyWording, notes};
 use crate::servo::{ServoDelay, ServoEstimator, ServoIdentification, ServoModel, ServoRowError, ServoStatus};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
@@ -97,7 +97,7 @@ impl ServoModel {
 
 impl ServoIdentification {
     /// The result as one JSON object, with the keys of an identification from forces where they have the same meaning.
-    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
+    pub fn json(&self, wording: &dyn RemedyWording) -> Value {
         let parameters = self.parameters.iter().map(|p| {
             json!({
                 "name": p.name,
@@ -138,7 +138,7 @@ impl ServoIdentification {
                 "open": freedom.open,
                 "fixed_by": freedom.fixed_by,
             })).collect::<Vec<_>>(),
-            "data": notes(&self.notes, spelling),
+            "data": notes(&self.notes, wording),
         })
     }
 

@@ -12,16 +12,16 @@ use modelmill_spec::{
 use serde_json::{Value, json};
 
 use crate::model::{ModelCheck, ModelSummary, SampledRank, ineffective_retained};
-use crate::print::RemedySpelling;
+use crate::print::RemedyWording;
 use crate::text::TerminalStyle;
 use crate::text::table::{count, significant};
 
 impl ModelCheck {
     /// Contents of the model as one JSON object, with all warnings.
-    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
+    pub fn json(&self, wording: &dyn RemedyWording) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
-        let mut warnings = self::warnings(loaded, spelling);
+        let mut warnings = self::warnings(loaded, wording);
         // Warnings of the derivation come after those of the file: retained products that the reduction could not
         // use.
         let in_vain = ineffective_retained(&model.derivation).into_iter();
@@ -44,7 +44,7 @@ impl ModelCheck {
         object["valid"] = json!(self.impossible_values().is_empty());
         object["magnitudes"] = self.magnitudes.json();
         object["numeric_rank"] = self.rank.as_ref().map_or(Value::Null, SampledRank::json);
-        object["next"] = json!(self.next_step().map(|step| step.spell(spelling)));
+        object["next"] = json!(self.next_step().map(|step| step.format_for(wording)));
         object
     }
 
@@ -86,10 +86,10 @@ impl ModelCheck {
     }
 
     /// The same for people, with the next step.
-    pub fn text_with_next_step(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text_with_next_step(&self, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let text = self.text(style);
         match self.next_step() {
-            Some(step) => format!("{text}\n\n{}", step.spell(spelling)),
+            Some(step) => format!("{text}\n\n{}", step.format_for(wording)),
             None => text,
         }
     }
@@ -98,11 +98,11 @@ impl ModelCheck {
     /// recording. `None` if the model has no base parameters or no drives, or if values are impossible.
     pub fn next_step(&self) -> Option<Message> {
         let model = &self.model;
-        if model.base.is_empty() || model.drives().is_empty() || !self.impossible_values().is_empty() {
+        if model.base.is_empty() || model.row_names().is_empty() || !self.impossible_values().is_empty() {
             return None;
         }
         let excite = Remedy::command(CommandName::Excite);
-        Some(if (0..model.base.len()).all(|k| model.has_nominal(k)) {
+        Some(if (0..model.base.len()).all(|k| model.has_values(k)) {
             message!(
                 "Next: {} compares the forces of the model with those of a recording, and finds what the model lacks; {} plans a \
                  motion for one.",
@@ -129,20 +129,20 @@ pub fn refusal(says: &str, path: &str) -> Value {
 }
 
 /// Errors of an invalid model file, as one JSON object.
-pub fn faults(failure: &LoadFailure, spelling: &dyn RemedySpelling) -> Value {
+pub fn faults(failure: &LoadFailure, wording: &dyn RemedyWording) -> Value {
     json!({
         "valid": false,
-        "diagnostics": diagnostics(&failure.diagnostics, &failure.sources, spelling),
+        "diagnostics": diagnostics(&failure.diagnostics, &failure.sources, wording),
     })
 }
 
 /// Warnings of a valid model file, each as a JSON object.
-pub fn warnings(loaded: &LoadedModel, spelling: &dyn RemedySpelling) -> Vec<Value> {
-    diagnostics(&loaded.warnings, &loaded.sources, spelling)
+pub fn warnings(loaded: &LoadedModel, wording: &dyn RemedyWording) -> Vec<Value> {
+    diagnostics(&loaded.warnings, &loaded.sources, wording)
 }
 
 /// Diagnostics of a model file as JSON, with file, line and column where they are known.
-fn diagnostics(found: &[Diagnostic], sources: &SourceFiles, spelling: &dyn RemedySpelling) -> Vec<Value> {
+fn diagnostics(found: &[Diagnostic], sources: &SourceFiles, wording: &dyn RemedyWording) -> Vec<Value> {
     found
         .iter()
         .map(|one| {
@@ -162,7 +162,7 @@ fn diagnostics(found: &[Diagnostic], sources: &SourceFiles, spelling: &dyn Remed
                 "line": place.as_ref().map(|p| p.1),
                 "column": place.as_ref().map(|p| p.2),
                 "expected": one.label,
-                "help": one.help.iter().map(|help| help.spell(spelling)).collect::<Vec<_>>(),
+                "help": one.help.iter().map(|help| help.format_for(wording)).collect::<Vec<_>>(),
             })
         })
         .collect()

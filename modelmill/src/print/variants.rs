@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::print::{RemedySpelling, notes, tables};
+use crate::print::{RemedyWording, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
 use crate::variants::{DriveEffort, DriveVariants, LimitCrossing, LimitUse, TermShare, VariantComparison};
@@ -24,7 +24,7 @@ impl VariantComparison {
     ///   comes from the new value
     /// - `limits`: range of each limit, and the fraction of it that is used (1 at the limit)
     /// - `errors`: relative to measured forces, if the recordings have them
-    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
+    pub fn json(&self, wording: &dyn RemedyWording) -> Value {
         // Limits with the range in both files and the use by both models.
         let limits = self.limits.iter().map(|one| {
             let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });
@@ -42,7 +42,7 @@ impl VariantComparison {
             "drives": self.drives.iter().map(drive).collect::<Vec<_>>(),
             "limits": limits.collect::<Vec<_>>(),
             "errors": { "before": self.errors[0], "after": self.errors[1] },
-            "notes": notes(&self.notes, spelling),
+            "notes": notes(&self.notes, wording),
         })
     }
 

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use modelmill_boundary::text::html;
 use serde_json::{Value, json};
 
-use crate::print::RemedySpelling;
+use crate::print::RemedyWording;
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 use crate::verify::thresholds::{
@@ -36,7 +36,7 @@ pub struct VerificationContext<'a> {
 
 impl ModelVerification {
     /// The verification as one JSON object.
-    pub fn json(&self, context: &VerificationContext<'_>, spelling: &dyn RemedySpelling) -> Value {
+    pub fn json(&self, context: &VerificationContext<'_>, wording: &dyn RemedyWording) -> Value {
         let check = |one: &VerificationCheck| {
             json!({
                 "scope": one.scope.name(),
@@ -50,7 +50,7 @@ impl ModelVerification {
                 "unit": one.unit,
                 "default": one.is_default,
                 "says": one.says,
-                "cause": one.cause.as_ref().map(|cause| cause.spell(spelling)),
+                "cause": one.cause.as_ref().map(|cause| cause.format_for(wording)),
             })
         };
         let input = |one: &FileFingerprint| json!({"role": one.role.name(), "file": one.file, "sha256": one.sha256});
@@ -70,7 +70,7 @@ impl ModelVerification {
                 "verdict": self.diagnosis.as_ref().ok().map(|found| found.diagnosis.verdict),
                 "says": match &self.diagnosis {
                     Ok(found) => found.verdict_text(),
-                    Err(error) => error.spell(spelling),
+                    Err(error) => error.format_for(wording),
                 },
             },
             "inputs": context.inputs.iter().map(input).collect::<Vec<_>>(),
@@ -79,12 +79,7 @@ impl ModelVerification {
     }
 
     /// The verification as text: the result, a table of the checks, and the causes of failures.
-    pub fn text(
-        &self,
-        context: &VerificationContext<'_>,
-        style: TerminalStyle,
-        spelling: &dyn RemedySpelling,
-    ) -> String {
+    pub fn text(&self, context: &VerificationContext<'_>, style: TerminalStyle, wording: &dyn RemedyWording) -> String {
         let mut lines = vec![style.bold(&self.headline(context)), String::new()];
         lines.extend(self.table());
         let failed: Vec<&VerificationCheck> = self.checks.iter().filter(|one| one.state == CheckState::Fail).collect();
@@ -97,7 +92,7 @@ impl ModelVerification {
                     push_lines(
                         &mut lines,
                         "    ",
-                        &sentence(&format!("Cause: {}", cause.spell(spelling))),
+                        &sentence(&format!("Cause: {}", cause.format_for(wording))),
                     );
                 }
             }
@@ -128,7 +123,7 @@ impl ModelVerification {
 
     /// The verification as JUnit XML: a test suite for each scope, a test case for each check. Checks that were not
     /// evaluated are skipped test cases.
-    pub fn junit(&self, spelling: &dyn RemedySpelling) -> String {
+    pub fn junit(&self, wording: &dyn RemedyWording) -> String {
         let suites: Vec<(CheckScope, Vec<&VerificationCheck>)> = (CheckScope::ALL.iter())
             .map(|scope| (*scope, self.checks.iter().filter(|one| one.scope == *scope).collect()))
             .collect();
@@ -163,7 +158,7 @@ impl ModelVerification {
                         );
                     }
                     CheckState::Fail => {
-                        let cause = one.cause.as_ref().map(|cause| cause.spell(spelling));
+                        let cause = one.cause.as_ref().map(|cause| cause.format_for(wording));
                         let cause = cause.map_or_else(String::new, |cause| sentence(&format!("Cause: {cause}")));
                         let _ = writeln!(
                             text,

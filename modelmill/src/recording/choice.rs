@@ -102,7 +102,7 @@ pub(super) fn choose_preparation(
     reading: &RecordingOptions,
     sticks: &StickPhases,
 ) -> Outcome<Vec<PreparationChoice>> {
-    let drives = model.drives();
+    let drives = model.row_names();
     let coordinates = model.active_coordinates();
     let mut groups: Vec<Vec<(OpenRecording<'_>, PreparationChoices)>> = Vec::new();
     for (index, raw) in recordings.iter().enumerate() {

@@ -208,7 +208,7 @@ fn map_joint_columns(
 /// repaired.
 fn optional_forces(model: &Model) -> Vec<String> {
     if model.derivation.mechanism.shared_drives.is_empty() {
-        model.drives()
+        model.row_names()
     } else {
         Vec::new()
     }

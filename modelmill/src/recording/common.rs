@@ -123,7 +123,7 @@ pub(super) fn choose(
 /// The stick phases of recordings of one machine, from states that are prepared with the options of the user; none in
 /// recordings without forces, or if states cannot be prepared, which is reported where they are needed.
 fn stick_phases(model: &Model, raws: &[&Raw], reading: &RecordingOptions) -> Outcome<StickPhases> {
-    let drives = model.drives();
+    let drives = model.row_names();
     if reading.preparation.unexamined || drives.is_empty() || model.base.is_empty() {
         return Ok(StickPhases::default());
     }

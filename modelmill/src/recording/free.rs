@@ -156,7 +156,7 @@ fn twist_halves(body: &FreeBody) -> [[usize; 3]; 2] {
 pub(super) fn runs(model: &Model, raw: &Raw, preparation: &StatePreparation) -> Outcome<Vec<PreparedRun>> {
     let mechanism = &model.derivation.mechanism;
     // The preparation treats the pose like any other coordinates.
-    let mut runs = raw.runs_with(&model.active_coordinates(), &model.drives(), preparation)?;
+    let mut runs = raw.runs_with(&model.active_coordinates(), &model.row_names(), preparation)?;
     for body in free_bodies(mechanism) {
         let [velocity, angular] = twist_halves(body).map(|half| {
             let name = &mechanism.coordinates[half[0]].name;

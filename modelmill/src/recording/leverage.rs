@@ -52,7 +52,7 @@ impl<'a> DriveLeverage<'a> {
     fn force_demand(&self, drive: usize, sample: usize) -> Option<f64> {
         let q: Vec<[f64; 1]> = self.q.iter().flatten().map(|q| [q[sample]]).collect();
         let (still, one) = (vec![[0.0]; q.len()], vec![[1.0]; q.len()]);
-        let load = vec![[0.0]; self.model.drives().len()];
+        let load = vec![[0.0]; self.model.row_names().len()];
         let states = MotionStates {
             q: slices(&q),
             qd: slices(&still),

@@ -250,7 +250,7 @@ impl PreparedRecording {
         else {
             return false;
         };
-        let (drives, factors) = (model.drives(), audit::gear_factors(model, first));
+        let (drives, factors) = (model.row_names(), audit::gear_factors(model, first));
         let is_geared = |at: &String| {
             let mut pairs = drives.iter().zip(&factors);
             pairs.any(|(drive, factor)| drive == at && factor.is_some())

@@ -164,7 +164,7 @@ pub(super) fn read_raw(model: &Model, file: &RecordingFiles, reading: &Recording
     let coordinates = model.measured_coordinates();
     raw.repair(
         &coordinates,
-        &model.drives(),
+        &model.row_names(),
         reading.skip_bad_samples,
         &|drive, sample| leverage.is_peak(drive, sample),
     );

@@ -122,7 +122,7 @@ pub(super) fn prepare(
         first.notes.splice(0..0, suspicions);
         let mut coordinates = model.active_coordinate_types();
         coordinates.retain(|(name, _)| measured.contains(name));
-        let oddities = recording.signal_notes(&coordinates, &model.drives());
+        let oddities = recording.signal_notes(&coordinates, &model.row_names());
         first.notes.splice(0..0, oddities);
     }
     // Models with actuators may have recordings without forces, which few operations can use.
@@ -148,7 +148,7 @@ pub(super) fn prepare(
         .collect();
     for run in &mut runs {
         if is_examined {
-            let idle = run.zero_force_notes(&model.drives(), &model.undriven_rows());
+            let idle = run.zero_force_notes(&model.row_names(), &model.undriven_rows());
             run.notes.extend(idle);
         }
         compensate_delay(run, delay)?;
@@ -166,7 +166,7 @@ pub(super) fn prepare(
         Vec::new()
     };
     let with_variance = runs.into_iter().map(|run| {
-        let variance = variances::recorded_variances(recording, &run, &model.drives())?;
+        let variance = variances::recorded_variances(recording, &run, &model.row_names())?;
         Ok(RecordingSegment {
             run,
             variance,

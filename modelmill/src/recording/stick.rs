@@ -198,7 +198,7 @@ impl StickPhases {
 
     /// As [`Self::mark`], with a note on what is left out.
     pub(super) fn leave_out(&self, model: &Model, recording: usize, data: &mut [RecordingSegment]) {
-        let drives = model.drives();
+        let drives = model.row_names();
         let out = self.mark(recording, data);
         // One note for all recordings: the decision is common to them.
         if let (0, Some(first)) = (recording, data.first_mut()) {
@@ -242,7 +242,7 @@ impl StickPhases {
         if self.blurred.is_empty() {
             return;
         }
-        let drives = model.drives();
+        let drives = model.row_names();
         let names: Vec<String> = self.blurred.iter().map(|d| format!("`{}`", drives[*d])).collect();
         let says = message!(
             "Forces about reversals of {} are kept in all recordings: most of what would be left out is the blur of the \
@@ -314,7 +314,7 @@ impl SlowCounts {
 
 /// The largest rate of each drive over all recordings, rad/s or m/s.
 fn fastest_rates(model: &Model, recordings: &[Vec<PreparedRun>]) -> Option<Vec<f64>> {
-    let mut fastest = vec![0.0_f64; model.drives().len()];
+    let mut fastest = vec![0.0_f64; model.row_names().len()];
     for run in recordings.iter().flatten() {
         let every: Vec<usize> = (0..run.samples()).collect();
         let rates = rates_of_drives(model, &PickedStates::new(run, &every))?;
@@ -347,7 +347,7 @@ impl FrictionRows {
         recordings: &[Vec<PreparedRun>],
         select: &dyn Fn(&PreparedRun) -> Option<Vec<usize>>,
     ) -> Option<Self> {
-        let drives = model.drives().len();
+        let drives = model.row_names().len();
         let mut blocks = Vec::new();
         let (mut forces, mut is_measured) = (Vec::new(), Vec::new());
         let mut rates = vec![Vec::new(); drives];

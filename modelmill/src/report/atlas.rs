@@ -127,9 +127,9 @@ fn mechanism(one: &AtlasMechanism) -> String {
 
 /// Base parameters with expressions, nominal values and units, folded.
 fn expressions(model: &Model) -> String {
-    let rows: Vec<Vec<TableCell>> = (model.base.iter().zip(&model.nominal).enumerate())
+    let rows: Vec<Vec<TableCell>> = (model.base.iter().zip(&model.values).enumerate())
         .map(|(k, (base, value))| {
-            let value = if model.has_nominal(k) {
+            let value = if model.has_values(k) {
                 TableCell::number(&significant(*value, 6), *value)
             } else {
                 TableCell::text("")

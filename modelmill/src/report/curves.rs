@@ -47,7 +47,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);
-    let drives = before.model.drives().len();
+    let drives = before.model.row_names().len();
     let curves = shown * drives * if after.is_some() { 5 } else { 3 };
     // Many recordings and drives share the budget, so that the page stays small.
     let most = (BUDGET / curves.max(1)).max(LEAST);
@@ -88,7 +88,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
 fn run_panels(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2], k: usize, most: usize) -> String {
     let mut html = String::new();
     let mut packed = Vec::new();
-    for (d, drive) in before.model.drives().iter().enumerate() {
+    for (d, drive) in before.model.row_names().iter().enumerate() {
         let unit = force_unit(&before.model, d);
         // Two panels for each drive: forces, and their errors.
         for (title, curves) in panels(before, after, names, k, d, drive) {

@@ -113,7 +113,7 @@ fn pairs(variables: &[MapVariable]) -> Vec<(usize, usize)> {
 pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, variables: &[MapVariable]) -> String {
     let judged = before.validation_runs();
     let mut html = String::new();
-    for (d, drive) in before.model.drives().iter().enumerate() {
+    for (d, drive) in before.model.row_names().iter().enumerate() {
         // Errors on the runs that judge the model.
         let error = before.errors(&judged, d);
         // With a delay the model with effects has other samples.

@@ -11,14 +11,14 @@ use modelmill_identify::diagnose::DiagnosisVerdict;
 use super::{DiagnosisFindings, curves, legend, maps, regions, spectrum, steps, tables, words};
 use crate::compare::ErrorLocations;
 use crate::error::Outcome;
-use crate::print::{StepSpelling, laws as law_texts, values_text};
+use crate::print::{StepWording, laws as law_texts, values_text};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
-/// The HTML of the page; `spelling` writes commands or calls for its reader.
+/// The HTML of the page; `wording` writes commands or calls for its reader.
 ///
 /// Fails only if the derivation of the equations is cancelled.
-pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcome<String> {
+pub fn page(findings: &DiagnosisFindings, wording: &dyn StepWording) -> Outcome<String> {
     // Equations are those of the model with the effects, if it could be built.
     let final_version = findings.final_version();
     let equations = final_version.model.equations(PageFormat::Html)?.text;
@@ -31,7 +31,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
         (
             "found",
             "Missing effects and next steps",
-            missing_section(findings, spelling),
+            missing_section(findings, wording),
         ),
         ("curves", "Measured and calculated forces", curves_section(findings)),
         ("where", "Where the error is largest", location(findings)),
@@ -45,7 +45,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
         (
             "data",
             "Recordings and their preparation",
-            tables::data(findings, spelling),
+            tables::data(findings, wording),
         ),
         ("equations", "Equations", embed_equations(findings, &equations)),
     ];
@@ -138,7 +138,7 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. \
-         The noise or rounding is that of all recordings together.</p>\n<ul>\n\
+         The line of the noise or rounding is computed from all recordings together.</p>\n<ul>\n\
          <li><i>decrease of the squared error</i>: relative to the step before, evaluated {} and only for the drives on \
          which the added effects act.</li>\n\
          <li><i>t value of the decrease</i>: its mean over blocks of time, divided by its standard error.</li>\n\
@@ -155,17 +155,17 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
 }
 
 /// Missing effects with next steps, then laws.
-fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+fn missing_section(findings: &DiagnosisFindings, wording: &dyn StepWording) -> String {
     // Effects of the library come before laws, which are only hypotheses.
-    let mut html = effects(findings, spelling);
+    let mut html = effects(findings, wording);
     if !findings.laws.is_empty() {
-        html.push_str(&laws(findings, spelling));
+        html.push_str(&laws(findings, wording));
     }
     html
 }
 
 /// Laws that would explain the residual.
-fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+fn laws(findings: &DiagnosisFindings, wording: &dyn StepWording) -> String {
     let model = &findings.before.model;
     let mut html = format!(
         "<h3>Laws that would explain the residual</h3>\n<p>{}</p>\n",
@@ -192,7 +192,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
         // A law without memory can be added from a library file.
         match &law.entry {
             Some(entry) => {
-                let command = spelling.spell_effect_of_library(model, &entry.effect, law_texts::LIBRARY);
+                let command = wording.format_effect_of_library(model, &entry.effect, law_texts::LIBRARY);
                 let _ = writeln!(
                     html,
                     "<p>As a library file, <code>{}</code>, and the step that adds it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
@@ -211,7 +211,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
 }
 
 /// Missing effects and the steps that add them, or the reason why none should be added.
-fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+fn effects(findings: &DiagnosisFindings, wording: &dyn StepWording) -> String {
     // Without entries to add there may still be findings, such as a delayed force signal.
     if findings.entries_to_add().is_empty() {
         if let Some(says) = findings.further_action() {
@@ -238,7 +238,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
         let _ = writeln!(
             html,
             "<p class=\"alias\">The model with these effects could not be built: {}</p>",
-            escape(&says.spell(spelling))
+            escape(&says.format_for(wording))
         );
     }
     let model = &findings.before.model;
@@ -246,9 +246,9 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
     let mut commands: Vec<String> = findings
         .entries_to_add()
         .iter()
-        .map(|entry| spelling.spell_effect(model, entry))
+        .map(|entry| wording.format_effect(model, entry))
         .collect();
-    commands.push(spelling.spell_identification(model));
+    commands.push(wording.format_identification(model));
     let _ = writeln!(
         html,
         "<p>Add the effects to the model file (its comments stay), and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",
@@ -370,7 +370,8 @@ fn parameters(findings: &DiagnosisFindings) -> String {
                 "<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive \
                  are divided by the standard deviation of its residual. The standard deviations in this section are computed \
                  from the residual alone, and allow for its correlation in time. The section of missing effects also uses the \
-                 upper bound of the noise, so its standard deviations may differ.</p>\n",
+                 upper bound of the noise, so its standard deviations may differ. With little noise the standard deviations are small, so a \
+                 difference of many of them may still be far too small to matter.</p>\n",
             );
             html.push_str(&tables::parameters(after));
             let _ = writeln!(

@@ -78,7 +78,7 @@ fn picture(
     variables: &[MapVariable],
 ) -> Option<String> {
     let model = &before.model;
-    let d = model.drives().iter().position(|d| *d == region.channel)?;
+    let d = model.row_names().iter().position(|d| *d == region.channel)?;
     let judged = before.validation_runs();
     // A segment of time belongs to one recording, which its sentence names if there are several.
     let runs: Vec<usize> = if region.variable == TIME_COLUMN {

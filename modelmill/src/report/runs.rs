@@ -10,7 +10,7 @@ use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, range, with_room};
 use super::page::end;
 use super::tables::{TableCell, table};
 use super::units::typographic_unit;
-use crate::print::RemedySpelling;
+use crate::print::RemedyWording;
 use crate::print::runs::verdict_text;
 use crate::runs::{FittedValue, RunChange, RunReport, RunVerdict, RunsComparison, SharedFit};
 use crate::text::svg::escape;
@@ -21,8 +21,8 @@ const HEIGHT: f64 = 170.0;
 /// Length of a bar to either side, in standard deviations.
 const BARS: f64 = 2.0;
 
-/// The HTML of the page; `spelling` writes commands or calls for its reader.
-pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
+/// The HTML of the page; `wording` writes commands or calls for its reader.
+pub fn runs_page(compared: &RunsComparison, wording: &dyn RemedyWording) -> String {
     let title = format!("{}: changes between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
@@ -32,7 +32,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
         (
             "against",
             "Each run compared with the first",
-            changes_table(compared, spelling),
+            changes_table(compared, wording),
         ),
     ];
     // The joint fit exists only if it was requested.
@@ -40,7 +40,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
         sections.push(("own", "Joint fit of all runs", shared_fit_section(shared)));
     }
     sections.push(("parameters", "Base parameters over the runs", parameters(compared)));
-    sections.push(("runs", "The runs", runs(compared, spelling)));
+    sections.push(("runs", "The runs", runs(compared, wording)));
     for (id, title, html) in sections {
         let _ = write!(page, "<section id=\"runs-{id}\">\n<h2>{title}</h2>\n{html}</section>\n");
     }
@@ -147,7 +147,7 @@ fn value(fitted: Option<FittedValue>) -> TableCell {
 }
 
 /// Runs that differ from the first one or cannot be compared, with their changes and verdicts.
-fn changes_table(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
+fn changes_table(compared: &RunsComparison, wording: &dyn RemedyWording) -> String {
     let is_quiet = |k: usize, run: &RunReport| {
         run.changes.is_empty() && (k == 0 || run.verdict() == RunVerdict::Unchanged && run.undecided.is_empty())
     };
@@ -161,7 +161,7 @@ fn changes_table(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
             };
             // The first run is compared with nothing.
             let verdict = if k > 0 {
-                verdict_text(run).spell(spelling)
+                verdict_text(run).format_for(wording)
             } else {
                 String::new()
             };
@@ -320,7 +320,7 @@ pub fn parameter_history(
 }
 
 /// All runs with their sizes, and those that could not be evaluated with the reason.
-fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
+fn runs(compared: &RunsComparison, wording: &dyn RemedyWording) -> String {
     // Runs are numbered from 1, as everywhere in the output.
     let mut rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
@@ -334,7 +334,7 @@ fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
         .collect();
     // Failed runs are listed too, so that none is missed.
     rows.extend(compared.unread.iter().map(|one| {
-        let says = TableCell::text(&format!("not evaluated: {}", one.error.spell(spelling)));
+        let says = TableCell::text(&format!("not evaluated: {}", one.error.format_for(wording)));
         vec![
             TableCell::text(""),
             TableCell::text(&one.file),

@@ -74,7 +74,7 @@ fn goertzel(values: &[f64], bin: usize) -> f64 {
 /// A figure for each drive: density of the residual over frequency, before and after the effects.
 pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> String {
     let mut html = String::new();
-    for (d, drive) in before.model.drives().iter().enumerate() {
+    for (d, drive) in before.model.row_names().iter().enumerate() {
         let of = |version: &ModelVersion| -> Vec<(f64, f64)> {
             // The longest run resolves the lowest frequencies.
             let judged = version.validation_runs();

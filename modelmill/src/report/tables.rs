@@ -9,7 +9,7 @@ use super::draw::attribute;
 use super::units::{force_unit, typographic_unit};
 use super::{DiagnosisFindings, ModelVersion, words};
 use crate::diagnose::MissingEffect;
-use crate::print::StepSpelling;
+use crate::print::StepWording;
 use crate::text::svg::escape;
 use crate::text::table::{all_digits, percent, significant};
 
@@ -122,7 +122,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     let before = &findings.before;
     let rows: Vec<Vec<TableCell>> = before
         .model
-        .drives()
+        .row_names()
         .iter()
         .enumerate()
         .map(|(d, drive)| {
@@ -189,7 +189,7 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
         }
         // Longer explanations are folded.
         if let Some(kind) = kind {
-            let texts = [&kind.explains, &kind.doubles];
+            let texts = [&kind.explains, &kind.confused_with];
             let texts: Vec<String> = texts
                 .iter()
                 .filter(|text| !text.is_empty())
@@ -311,7 +311,7 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
         // The nominal value of an effect that was just added is its estimate.
         let nominal = p
             .nominal
-            .filter(|_| !version.model.is_effect(k) && version.model.has_nominal(k));
+            .filter(|_| !version.model.is_effect(k) && version.model.has_values(k));
         // Four digits are enough for comparison; JSON has all of them.
         let number = |v: f64| TableCell::number(&significant(v, 4), v);
         let none = || TableCell::text("");
@@ -368,7 +368,7 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
 }
 
 /// Recordings with their sizes, and notes on faults and preparation.
-pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+pub(crate) fn data(findings: &DiagnosisFindings, wording: &dyn StepWording) -> String {
     let rows: Vec<Vec<TableCell>> = findings
         .before
         .runs
@@ -408,7 +408,7 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
         let _ = writeln!(
             html,
             "<li class=\"{class}\">{word}{}</li>",
-            escape(&note.says.spell(spelling))
+            escape(&note.says.format_for(wording))
         );
     }
     html.push_str("</ul>\n");

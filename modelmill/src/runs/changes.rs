@@ -207,7 +207,7 @@ pub(crate) fn possible_changes(
         let at = layout.payload(f);
         all.push(possible(ChangeKind::Payload(frame.clone()), (at..at + TEN).collect()));
     }
-    for drive in 0..model.drives().len() {
+    for drive in 0..model.row_names().len() {
         let friction = layout.friction(drive);
         for (kind, columns) in [
             (ChangeKind::Friction(drive), vec![friction, friction + 1]),
@@ -263,7 +263,7 @@ fn clock_text(factor: ChangeEstimate) -> String {
 
 /// The change of a contact or push within a run.
 pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
-    let names = model.drives();
+    let names = model.row_names();
     let drives = event.drives.iter();
     let what = PhysicalChange::ContactEvent {
         drives: drives.map(|(d, largest, _)| (names[*d].clone(), *largest)).collect(),
@@ -285,7 +285,7 @@ fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, val
         value: found.values[i],
         std: found.covariance[(i, i)].max(0.0).sqrt(),
     };
-    let drive = |d: &usize| model.drives()[*d].clone();
+    let drive = |d: &usize| model.row_names()[*d].clone();
     match kind {
         ChangeKind::Payload(frame) => {
             // Mass and centre are given only if the mass is known.
@@ -402,7 +402,7 @@ pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
 
 /// The name of a kind of change, as a noun phrase.
 pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
-    let drive = |d: &usize| model.drives()[*d].clone();
+    let drive = |d: &usize| model.row_names()[*d].clone();
     match kind {
         ChangeKind::Payload(frame) => format!("a load on {frame}"),
         ChangeKind::Friction(d) => format!("friction of {}", drive(d)),
@@ -416,7 +416,7 @@ pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
 /// The change as a clause, with its values.
 pub(crate) fn change_text(model: &Model, what: &PhysicalChange) -> String {
     let unit = |name: &str| {
-        let at = model.drives().iter().position(|drive| drive == name);
+        let at = model.row_names().iter().position(|drive| drive == name);
         at.map_or("", |d| model.force_unit(d))
     };
     match what {

@@ -65,7 +65,7 @@ impl SegmentRows {
             if model.is_known(k) {
                 for (force, known) in forces.iter_mut().zip(&column.0) {
                     for (f, x) in force.iter_mut().zip(known.iter().flatten()) {
-                        *f -= model.nominal[k] * x;
+                        *f -= model.values[k] * x;
                     }
                 }
             } else {
@@ -176,7 +176,7 @@ fn payload_columns(model: &Model, stretch: &RecordingSegment, payloads: &Payload
 
 /// Columns of dry and viscous friction of each drive, followed by a constant force on each.
 fn drive_columns(model: &Model, stretch: &RecordingSegment, samples: usize) -> Outcome<Vec<ForceColumn>> {
-    let n = model.drives().len();
+    let n = model.row_names().len();
     // Each of these columns acts on one drive.
     let only = |drive: usize, values: Vec<f64>| {
         let mut column = ForceColumn(vec![None; n]);
@@ -236,7 +236,7 @@ fn prediction_columns(
     let all: Vec<f64> = (0..model.base.len())
         .map(|k| {
             if model.is_known(k) {
-                model.nominal[k]
+                model.values[k]
             } else {
                 next.next().copied().unwrap_or(0.0)
             }

@@ -22,7 +22,7 @@ impl RunColumnLayout {
         Self {
             base: (0..model.base.len()).filter(|k| !model.is_known(*k)).count(),
             payloads: payloads.frames.len(),
-            drives: model.drives().len(),
+            drives: model.row_names().len(),
             coordinates: model.active_coordinates().len(),
         }
     }

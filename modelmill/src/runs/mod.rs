@@ -52,7 +52,10 @@ use points::DriveDoubts;
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-use thresholds::{CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S};
+use thresholds::{
+    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, LARGE_UNEXPLAINED_SHARE, NEGATIVE_FRICTION_SIGMAS,
+    PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S, TURNED_SCALE_TOLERANCE,
+};
 use time_base::{TimeBase, correct_clock, time_scaling};
 use verdict::{RunKnowledge, undecided_reasons};
 pub use verdict::{RunVerdict, UndecidedDrive, UndecidedReason};
@@ -496,7 +499,7 @@ impl<'a> RunAnalyser<'a> {
             difference_factor,
         } = self.compare_pair(before, run);
         report.difference_factor = difference_factor;
-        report.undecided = (self.model.drives().into_iter().zip(&reasons))
+        report.undecided = (self.model.row_names().into_iter().zip(&reasons))
             .filter_map(|(drive, reason)| {
                 Some(UndecidedDrive {
                     drive,
@@ -544,7 +547,12 @@ impl<'a> RunAnalyser<'a> {
             .iter()
             .map(|one| !one.is_some_and(verdict::UndecidedReason::spoils_fit));
         let believed: Vec<bool> = believed.collect();
+        let unexplained = |d: usize| before.unexplained.0[d].max(run.unexplained.0[d]);
         let mut found = self.significant_changes(&runs, &run.sizes, &believed);
+        self.drop_below_unexplained(&mut found, &run.sizes, unexplained);
+        if found.iter().any(|one| self.is_implausible(one, &before.values)) {
+            found.clear();
+        }
         self.drop_unknown_friction(&mut found, |d| before.stands[d] || run.stands[d]);
         let scales = self.widen_loads(&mut found, [&before.white.drives, &run.white.drives]);
         PairFindings {
@@ -552,6 +560,44 @@ impl<'a> RunAnalyser<'a> {
             scales,
             difference_factor: (sensitivity.min_gain / sensitivity.min_gain_of_noise).max(1.0).sqrt(),
             reasons,
+        }
+    }
+
+    /// Drops changes that explain less than what stays unexplained of every drive that they act on: there an effect that the
+    /// model lacks is as likely. `unexplained` gives the share of the rms force of a drive that no parameters explain (1).
+    fn drop_below_unexplained(
+        &self,
+        found: &mut Vec<SelectedChange>,
+        sizes: &MeasuredMoments,
+        unexplained: impl Fn(usize) -> f64,
+    ) {
+        found.retain(|one| {
+            let columns = &self.possible[one.candidate].candidate.columns;
+            let fractions = sizes.force_fractions(columns, &one.values);
+            let mut drives = fractions.iter().enumerate();
+            drives.any(|(d, part)| {
+                let rest = unexplained(d);
+                *part > CHANGE_LEAST_FORCE_SHARE && (rest < LARGE_UNEXPLAINED_SHARE || *part > rest)
+            })
+        });
+    }
+
+    /// Whether a change is impossible: friction would drive the machine, or the scale of a force would be negative without a
+    /// turned sign. Then the model lacks an effect, and all changes that were found with this one are doubtful. `values` are the base parameters of
+    /// the first run.
+    fn is_implausible(&self, one: &SelectedChange, values: &DVector<f64>) -> bool {
+        let change = one.values[0];
+        match self.possible[one.candidate].kind {
+            ChangeKind::Friction(d) => {
+                let Some(before) = changes::friction(self.model, d)[0].map(|k| values[k]) else {
+                    return false;
+                };
+                let std = one.covariance[(0, 0)].max(0.0).sqrt();
+                before.min(before + change) < -NEGATIVE_FRICTION_SIGMAS * std
+            }
+            // A turned sign has the factor -1.
+            ChangeKind::Scale(_) => 1.0 + change < 0.0 && (2.0 + change).abs() > TURNED_SCALE_TOLERANCE,
+            _ => false,
         }
     }
 
@@ -636,7 +682,7 @@ fn merge_known(model: &Model, unknown: impl Fn(usize) -> FittedValue) -> Vec<Fit
     let of = |k: usize| {
         if model.is_known(k) {
             return FittedValue {
-                value: model.nominal[k],
+                value: model.values[k],
                 std: Some(0.0),
             };
         }

@@ -259,7 +259,7 @@ impl<'a> SharedFitBuilder<'a> {
 
     /// The columns of a change.
     fn changed_columns(&self, change: &PhysicalChange) -> Vec<usize> {
-        let (layout, drives) = (self.layout, self.model.drives());
+        let (layout, drives) = (self.layout, self.model.row_names());
         let at = |names: &[String], name: &String| names.iter().position(|one| one == name);
         let columns = match change {
             PhysicalChange::Payload { frame, .. } => {
@@ -379,7 +379,7 @@ impl<'a> SharedFitBuilder<'a> {
             .collect();
         let of_base = |k: usize| match unknown.iter().position(|one| *one == k) {
             None => Some(FittedValue {
-                value: self.model.nominal[k],
+                value: self.model.values[k],
                 std: Some(0.0),
             }),
             Some(column) => {
@@ -394,7 +394,7 @@ impl<'a> SharedFitBuilder<'a> {
             let std = scale.std.map(|one| one * value * value);
             (drive, FittedValue { value, std })
         };
-        let drives = self.model.drives().into_iter().enumerate();
+        let drives = self.model.row_names().into_iter().enumerate();
         let runs = self.runs.iter().zip(parts).zip(owns).zip(&found.own);
         SharedFit {
             shared: (0..self.model.base.len()).map(of_base).collect(),
@@ -532,7 +532,7 @@ fn per_run_columns(
         let both = |(name, unit): &(&str, &str)| ((*name).to_owned(), (*unit).to_owned());
         all.iter().map(both).collect()
     };
-    let drives = model.drives();
+    let drives = model.row_names();
     Ok(match what.as_str() {
         "payload" => {
             let name = at.as_deref().unwrap_or_default();
@@ -624,7 +624,7 @@ fn base_parameter(
              `friction` or `gain@{}`",
             KINDS.join(", "),
             payloads.frames.last().map_or("body", String::as_str),
-            model.drives().first().map_or("drive", String::as_str)
+            model.row_names().first().map_or("drive", String::as_str)
         )));
     };
     Ok(PerRunColumns {

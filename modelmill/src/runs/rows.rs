@@ -268,7 +268,7 @@ pub(crate) struct UnexplainedShares(pub(crate) Vec<f64>);
 
 /// The name of a drive.
 fn drive_name(model: &Model, drive: usize) -> String {
-    model.drives()[drive].clone()
+    model.row_names()[drive].clone()
 }
 
 /// Number of rows that are processed at once.

@@ -18,7 +18,7 @@ use crate::segment::RecordingSegment;
 ///
 /// Fails when a pose has no solution.
 pub(crate) fn exclude_uncertain_friction(model: &Model, segments: &mut [RecordingSegment]) -> Outcome<Vec<bool>> {
-    let drives = model.drives().len();
+    let drives = model.row_names().len();
     let rates: Vec<Vec<Vec<f64>>> = (segments.iter())
         .map(|one| drive_rates(model, one))
         .collect::<Outcome<_>>()?;

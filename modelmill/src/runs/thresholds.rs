@@ -15,6 +15,16 @@ pub(super) const CHANGE_VALUE_SIGMAS: f64 = 5.0;
 /// judgement: rigid models of real arms without friction leave up to 0.47.
 pub(super) const MOST_UNEXPLAINED_SHARE: f64 = 0.5;
 
+/// Above this share of a drive's rms force (1) that stays unexplained, a change must move the drive by more than this share.
+/// By judgement: below it, noise of real sensors is usual.
+pub(super) const LARGE_UNEXPLAINED_SHARE: f64 = 0.2;
+
+/// Dry friction is negative if it is below zero by more than this many standard deviations of its change. By judgement.
+pub(super) const NEGATIVE_FRICTION_SIGMAS: f64 = 2.0;
+
+/// A negative scale of a force within this distance of -1 (1) is a turned sign. By judgement.
+pub(super) const TURNED_SCALE_TOLERANCE: f64 = 0.2;
+
 /// A drive could not show a change if only one of more than this share of its rms force (1) would be reported. By
 /// judgement.
 pub(super) const UNDETECTABLE_FORCE_SHARE: f64 = 0.5;

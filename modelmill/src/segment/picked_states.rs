@@ -52,7 +52,7 @@ impl PickedStates {
 
     /// Positions and rates of the drives, `[order][drive][sample]`, rad or m, per s; `None` at a pose without solution.
     pub(crate) fn drive_motion(&self, model: &Model) -> Option<[Vec<Vec<f64>>; 2]> {
-        let n = model.drives().len();
+        let n = model.row_names().len();
         // Positions come first, rates behind them, the Jacobian last.
         let mut positions = ModelEvaluator::new(&model.derivation)
             .drive_motion(&self.as_motion())

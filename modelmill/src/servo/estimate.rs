@@ -229,7 +229,7 @@ impl<'a> ServoSystem<'a> {
         let references = servo.scale.freedoms.iter().map(|freedom| (freedom.reference, 1.0));
         let known = (0..model.base.len())
             .filter(|k| model.is_known(*k))
-            .map(|k| (k, model.nominal[k]));
+            .map(|k| (k, model.values[k]));
         let fixed: Vec<(usize, f64)> = known.chain(references).collect();
         let unknown = (0..model.base.len())
             .filter(|k| fixed.iter().all(|(one, _)| one != k))
@@ -390,7 +390,7 @@ impl<'a> ServoSystem<'a> {
                 Err(error) => return Err(failed(error)),
             }
         }
-        let mut nominal: Vec<f64> = self.unknown.iter().map(|k| self.servo.equations.nominal[*k]).collect();
+        let mut nominal: Vec<f64> = self.unknown.iter().map(|k| self.servo.equations.values[*k]).collect();
         nominal.resize(n, 0.0);
         let options = EstimateOptions::default();
         let found = estimate(&nominal, weights.len(), &options, |visit: &mut RowVisitor<'_>| {

@@ -515,7 +515,7 @@ struct SmoothMotion {
 impl SmoothMotion {
     /// The motion of all segments of a recording, one after another.
     fn new(servo: &ServoModel, recording: &PreparedRecording) -> Outcome<Self> {
-        let n_drives = servo.equations.drives().len();
+        let n_drives = servo.equations.row_names().len();
         let mut all = Self {
             time: Vec::new(),
             positions: vec![Vec::new(); n_drives],

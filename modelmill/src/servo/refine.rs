@@ -74,7 +74,7 @@ struct DelayEquations {
 impl DelayEquations {
     /// `None` without computed forces.
     fn new(model: &Model, segments: &[RecordingSegment]) -> Outcome<Option<Self>> {
-        let n_drives = model.drives().len();
+        let n_drives = model.row_names().len();
         // The same actuators in all segments: recordings may lack some of the signals.
         let mut places: BTreeMap<usize, usize> = BTreeMap::new();
         for one in segments.iter().filter_map(|one| one.computed.as_ref()) {
@@ -121,7 +121,7 @@ impl DelayEquations {
                     let mut row = vec![0.0; width];
                     let mut force = measured[drive][i];
                     for (k, column) in base.iter().enumerate().filter(|(k, _)| model.is_known(*k)) {
-                        force -= model.nominal[k] * value(column, drive, i);
+                        force -= model.values[k] * value(column, drive, i);
                     }
                     for (at, k) in estimated.iter().enumerate() {
                         row[at] = value(&base[*k], drive, i);

@@ -120,7 +120,7 @@ impl UsedSamples {
     pub(super) fn equations(&self, servo: &ServoModel, segment: &RecordingSegment) -> Outcome<EquationRows> {
         let model = &servo.equations;
         let evaluator = ModelEvaluator::new(&model.derivation);
-        let n_drives = model.drives().len();
+        let n_drives = model.row_names().len();
         let states = segment.states(0, segment.samples());
         let all = evaluator
             .regressor(&states)

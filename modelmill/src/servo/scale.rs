@@ -75,7 +75,7 @@ fn consistent_rows(model: &Model, n_unknown: usize) -> Result<DMatrix<f64>, Stri
     let values: Vec<f64> = (0..model.base.len())
         .map(|k| {
             if model.is_known(k) {
-                model.nominal[k]
+                model.values[k]
             } else {
                 0.5 + random.below_one()
             }

@@ -147,7 +147,7 @@ impl DriveEquations {
         let drive = actuator.drive.0;
         let row = servo.body_rows().iter().position(|d| *d == drive).unwrap_or(0);
         let signal = servo.signal_position(actuator);
-        let n_drives = model.drives().len();
+        let n_drives = model.row_names().len();
         let mut all = Self {
             force_rows: Vec::new(),
             states: ActuatorStates::default(),
@@ -323,7 +323,7 @@ impl DriveEquations {
 /// A segment for the model without servo equations: signals are its last coordinates, and their rows its last drives.
 fn without_signals(model: &Model, segment: &RecordingSegment) -> RecordingSegment {
     let mut own = segment.clone();
-    let (n, n_drives) = (model.active_coordinates().len(), model.drives().len());
+    let (n, n_drives) = (model.active_coordinates().len(), model.row_names().len());
     for columns in [&mut own.run.q, &mut own.run.qd, &mut own.run.qdd] {
         columns.truncate(n);
     }
@@ -337,7 +337,7 @@ fn without_signals(model: &Model, segment: &RecordingSegment) -> RecordingSegmen
 /// A limit as a disturbance, with a sentence.
 fn disturbance(model: &Model, plain: &ModelActuator, limited: &ModelActuator, fit: &LimitFit) -> Disturbance {
     let drive = plain.drive.0;
-    let name = model.drives()[drive].clone();
+    let name = model.row_names()[drive].clone();
     let share = percent(Some(fit.reduction));
     let (kind, estimate, says) = match limited.saturation.filter(|_| plain.saturation.is_none()) {
         Some(limit) => {

@@ -58,7 +58,7 @@ impl ModelCounterparts {
         }
         // Drives of one model only are named in a note.
         for (here, there) in [(0, 1), (1, 0)] {
-            let all = models.map(Model::drives);
+            let all = models.map(Model::row_names);
             let alone = all[here].iter().filter(|name| !all[there].contains(name));
             let alone: Vec<&str> = alone.map(String::as_str).collect();
             if !alone.is_empty() {
@@ -75,8 +75,8 @@ impl ModelCounterparts {
                 "{} and {} have no drive in common ({}; {}); give a drive the same name in both files",
                 models[0].path,
                 models[1].path,
-                models[0].drives().join(", "),
-                models[1].drives().join(", ")
+                models[0].row_names().join(", "),
+                models[1].row_names().join(", ")
             )));
         }
         Ok(Self {
@@ -126,7 +126,7 @@ fn without_forces(run: &PreparedRun) -> PreparedRun {
 fn with_own_load(model: &Model, mut states: RecordingSegment) -> Outcome<RecordingSegment> {
     if !model.load_dependent_effects().is_empty() {
         // Zero load makes the effects zero; the forces without them are the load.
-        states.load = Some(vec![vec![0.0; states.samples()]; model.drives().len()]);
+        states.load = Some(vec![vec![0.0; states.samples()]; model.row_names().len()]);
         states.load = Some(super::forces_of(model, &states)?);
     }
     Ok(states)

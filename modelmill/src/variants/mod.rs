@@ -190,7 +190,7 @@ fn for_both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
 ///
 /// Fails when the model cannot follow the motion; the message names it.
 fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
-    along::forces(model, states, &model.nominal).map_err(|error| match error {
+    along::forces(model, states, &model.values).map_err(|error| match error {
         Error::Cancelled => error,
         // The error names the model, since the recording does not show which of both cannot follow.
         error => Error::input(message!("{} cannot follow the motion: {}", model.path, error.message())),
@@ -221,7 +221,7 @@ fn errors(model: &Model, runs: &[RecordingSegment]) -> Outcome<Option<ErrorFigur
     }
     let forces = measured
         .iter()
-        .map(|one| along::forces(model, one, &model.nominal))
+        .map(|one| along::forces(model, one, &model.values))
         .collect::<Outcome<Vec<_>>>()?;
     let band = compare::band(&measured);
     compare::figures(model, &measured, &forces, band).map(Some)

@@ -242,7 +242,7 @@ fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Summ
             let place = SummandPlace {
                 base,
                 product: None,
-                value: model.nominal[base],
+                value: model.values[base],
             };
             found.push((one.retained.clone(), place));
             continue;

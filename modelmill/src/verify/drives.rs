@@ -29,7 +29,7 @@ fn errors(model: &Model, recording: &PreparedRecording) -> Outcome<Vec<Option<Dr
     let [data, _] = recording::segments(model, &[recording], &[]);
     let forces = data
         .iter()
-        .map(|one| along::forces(model, one, &model.nominal))
+        .map(|one| along::forces(model, one, &model.values))
         .collect::<Outcome<Vec<_>>>()?;
     let figures = compare::figures(model, &data, &forces, compare::band(&data))?;
     let of_drive = |drive: String| {
@@ -53,7 +53,7 @@ fn errors(model: &Model, recording: &PreparedRecording) -> Outcome<Vec<Option<Dr
             },
         })
     };
-    Ok(model.drives().into_iter().map(of_drive).collect())
+    Ok(model.row_names().into_iter().map(of_drive).collect())
 }
 
 /// The checks of all drives along a recording. The diagnosis, if there is one, gives the noise of each drive and the
@@ -66,7 +66,7 @@ pub(super) fn check_drives(
     limits: &VerificationLimits,
     findings: Option<&DiagnosisFindings>,
 ) -> Outcome<Vec<VerificationCheck>> {
-    let drives = model.drives();
+    let drives = model.row_names();
     let found = match errors(model, recording) {
         Err(Error::Cancelled) => return Err(Error::Cancelled),
         found => found,

@@ -113,7 +113,7 @@ impl VerificationLimits {
 
     /// Reads the table `drives`.
     fn read_drives(&mut self, model: &Model, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
-        let drives = model.drives();
+        let drives = model.row_names();
         for (key, value) in place.table(value, at, "drives")? {
             let name = key.get_ref().as_ref();
             if !drives.iter().any(|drive| drive == name) {

@@ -39,7 +39,7 @@ pub struct ModelVerification {
 }
 
 impl Model {
-    /// Tests the model, with the values of [`Model::nominal`], against recordings. All recordings are diagnosed
+    /// Tests the model, with the values of [`Model::values`], against recordings. All recordings are diagnosed
     /// together.
     ///
     /// Fails when the job is cancelled, or when a recording contains a pose that the mechanism cannot reach.

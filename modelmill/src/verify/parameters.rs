@@ -52,7 +52,7 @@ pub(super) fn check_parameters(
         if model.is_known(k) {
             // A number of the file needs no recording.
             let Some([low, high]) = interval else { continue };
-            let value = model.nominal[k];
+            let value = model.values[k];
             check.value = Some(value);
             check.state = if (low..=high).contains(&value) {
                 CheckState::Pass
@@ -68,7 +68,7 @@ pub(super) fn check_parameters(
             Ok(findings) => match determined_estimate(model, findings, k) {
                 Err(reason) => check.says = format!("{said} was not checked: {reason}"),
                 Ok(estimate) => {
-                    let nominal = model.has_nominal(k).then(|| model.nominal[k]);
+                    let nominal = model.has_values(k).then(|| model.values[k]);
                     evaluate(&mut check, &said, &estimate, nominal, shares[k]);
                     if check.state == CheckState::Fail {
                         check.cause = Some(parameter_cause(findings));
@@ -183,9 +183,9 @@ fn force_shares(model: &Model, recordings: &[&PreparedRecording]) -> Outcome<Vec
             continue;
         };
         let measured: Vec<f64> = measured.iter().map(|force| square(force)).collect();
-        let before = along::forces(model, one, &model.nominal)?;
+        let before = along::forces(model, one, &model.values)?;
         for (k, share) in shares.iter_mut().enumerate() {
-            let mut values = model.nominal.clone();
+            let mut values = model.values.clone();
             values[k] += 1.0;
             let after = along::forces(model, one, &values)?;
             for (d, (after, before)) in after.iter().zip(&before).enumerate() {

@@ -4,7 +4,7 @@
 use crate::made::{Made, bundled, run_of};
 use modelmill::Model;
 use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions};
-use modelmill::print::LibrarySpelling;
+use modelmill::print::RustWording;
 use modelmill::recording::RecordingOptions;
 
 /// The diagnosis of the two-link arm by recordings of a machine.
@@ -25,7 +25,7 @@ fn diagnosis(machine: &Model, made: Made) -> DiagnosisFindings {
 
 /// Whether a diagnosis names both the clock and the length `L` for the same error.
 fn names_both(found: &DiagnosisFindings) -> bool {
-    let answer = found.json(&LibrarySpelling);
+    let answer = found.json(&RustWording);
     let is = |one: &serde_json::Value, kind: &str, at: &str| one["kind"] == kind && one["at"][0] == at;
     let claims = ["effects", "disturbances"].map(|list| answer[list].as_array().cloned().unwrap_or_default());
     claims.into_iter().flatten().any(|claim| {

@@ -210,7 +210,7 @@ fn check(name: &str, path: &Path) {
     };
     let compared = nrms(&values);
     assert!((compared / fit - 1.0).abs() < 1e-6, "{name}: {compared} and {fit}");
-    let nominal = nrms(&model.nominal);
+    let nominal = nrms(&model.values);
     if has_values {
         assert!((0.8 * NOISE..1.05 * NOISE).contains(&nominal), "{name}: {nominal}");
     } else {

@@ -41,7 +41,7 @@ fn recording(model: &Model, [q, qd, qdd]: &[Vec<Vec<f64>>; 3], forces: &[Vec<f64
         columns.push((format!("{name}_dd"), qdd[k].clone()));
         columns.push((name, q[k].clone()));
     }
-    columns.extend(model.drives().into_iter().zip(forces.iter().cloned()));
+    columns.extend(model.row_names().into_iter().zip(forces.iter().cloned()));
     let prepared = model.recording_of_table("made", columns, &RecordingOptions::default());
     prepared.unwrap_or_else(|error| panic!("{}: {error}", model.name))
 }
@@ -61,7 +61,7 @@ fn along(model: &Model, function: ModelFunction, [q, qd, qdd]: [&[Vec<f64>]; 3])
         qdd: Some(rows(2)),
         forces: None,
     };
-    let found = model.functions().evaluate_at(function, &states, &model.nominal);
+    let found = model.functions().evaluate_at(function, &states, &model.values);
     found.unwrap_or_else(|error| panic!("{}: {error}", model.name))
 }
 
@@ -89,8 +89,8 @@ fn recorded_forces_return_the_recorded_motion() {
             ModelFunction::InverseDynamics,
             [&moved[0], &moved[1], &moved[2]],
         );
-        let run = recording(&model, &moved, &columns(&forces, model.drives().len()));
-        let made = model.simulate_motion(&run, &model.nominal).expect("a simulation");
+        let run = recording(&model, &moved, &columns(&forces, model.row_names().len()));
+        let made = model.simulate_motion(&run, &model.values).expect("a simulation");
         for (made, q) in made.q.iter().zip(&moved[0]) {
             for (a, b) in made.iter().zip(q) {
                 // Forces between samples are interpolated linearly, which is the largest error.
@@ -115,9 +115,9 @@ fn energy_is_kept() {
         let run = recording(
             &model,
             &motion(&model, samples, seed),
-            &vec![vec![0.0; samples]; model.drives().len()],
+            &vec![vec![0.0; samples]; model.row_names().len()],
         );
-        let made = model.simulate_motion(&run, &model.nominal).expect("a simulation");
+        let made = model.simulate_motion(&run, &model.values).expect("a simulation");
         let zeros = vec![vec![0.0; samples]; n];
         let mass = along(&model, ModelFunction::MassMatrix, [&made.q, &zeros, &zeros]);
         let gravity = along(&model, ModelFunction::Bias, [&made.q, &zeros, &zeros]);
@@ -181,7 +181,7 @@ fn a_mass_stops_and_breaks_away_as_by_hand() {
         force.push(if i <= 1000 { push } else { pull });
     }
     let run = recording(&model, &moved, &[force]);
-    let made = model.simulate_motion(&run, &model.nominal).expect("a simulation");
+    let made = model.simulate_motion(&run, &model.values).expect("a simulation");
     for i in 0..samples {
         let i = usize::try_from(i).expect("a count");
         let (a, b) = (made.q[0][i], moved[0][0][i]);
@@ -201,7 +201,7 @@ fn a_mass_stops_and_breaks_away_as_by_hand() {
 fn friction_of_linear_drives_holds_a_closed_loop() {
     let model = Model::open("../recordings/spidermill-days/spidermill-friction.toml").expect("a model");
     // The file gives no friction.
-    let mut values = model.nominal.clone();
+    let mut values = model.values.clone();
     for (value, base) in values.iter_mut().zip(&model.base) {
         match base.expression.as_str() {
             "Fc_spindle_left" => *value = 20.0,
@@ -247,8 +247,8 @@ fn horizons_show_a_wrong_mass() {
     let run = model
         .recording("../recordings/spidermill-mbs/plain-check.csv", &reading)
         .expect("a recording");
-    let right = model.compare_forward(&[&run], &model.nominal).expect("a comparison");
-    let mut wrong = model.nominal.clone();
+    let right = model.compare_forward(&[&run], &model.values).expect("a comparison");
+    let mut wrong = model.values.clone();
     wrong[0] *= 1.05;
     let other = model.compare_forward(&[&run], &wrong).expect("a comparison");
     let rms = |one: &modelmill::forward::ForwardComparison| one.horizons[0].rms.as_ref().expect("judged")[0];

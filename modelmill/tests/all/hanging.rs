@@ -5,7 +5,7 @@ use crate::made::{Made, bundled, run_of};
 use modelmill::Model;
 use modelmill::diagnose::DiagnosisOptions;
 use modelmill::faults::RecordingFaultKind;
-use modelmill::print::LibrarySpelling;
+use modelmill::print::RustWording;
 use modelmill::recording::RecordingOptions;
 use modelmill::text::TerminalStyle;
 
@@ -75,7 +75,7 @@ fn a_direction_of_gravity_is_stated_of_recordings_that_show_it() {
     assert_eq!(fault.kind, RecordingFaultKind::GravityDirection);
     assert_eq!(fault.recordings.len(), 2, "{fault:?}");
     // The model file may be wrong, so that this is no disturbance that is no model error.
-    let lines = found.text(TerminalStyle::PLAIN, &LibrarySpelling);
+    let lines = found.text(TerminalStyle::PLAIN, &RustWording);
     let text = lines.join("\n");
     assert!(text.contains("Before the next diagnosis: "), "{text}");
     let listed = text

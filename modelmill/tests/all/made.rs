@@ -145,11 +145,11 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         load: Vec::new(),
     };
     let evaluator = ModelEvaluator::new(&model.derivation);
-    let mut forces = evaluator.inverse_dynamics(&states, &model.nominal).expect("forces");
+    let mut forces = evaluator.inverse_dynamics(&states, &model.values).expect("forces");
     if let Made::Push(pushed, times, from, to) = made {
         let [with, without] = [pushed, model].map(|model| {
             let evaluator = ModelEvaluator::new(&model.derivation);
-            let forces = evaluator.inverse_dynamics(&at_rest, &model.nominal);
+            let forces = evaluator.inverse_dynamics(&at_rest, &model.values);
             forces.expect("forces")
         });
         push(&mut forces, &with, &without, times, from..to);
@@ -159,7 +159,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
     }
     let carried = forces.clone();
     let motion = evaluator.drive_motion(&states).expect("drives");
-    let drives = model.drives();
+    let drives = model.row_names();
     let mut clock = 1.0;
     for (d, force) in forces.iter_mut().enumerate() {
         let rate = &motion[drives.len() + d];

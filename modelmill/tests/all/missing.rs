@@ -296,7 +296,7 @@ fn friction_of_another_day_is_no_further_friction() {
     let friction = "[[effect]]\nkind = \"coulomb_friction\"\nat = \"PLACE\"\nparameters = { Fc = { name = \"Fc\", nominal = 2.0 } }\n\n\
                     [[effect]]\nkind = \"viscous_friction\"\nat = \"PLACE\"\nparameters = { Fv = { name = \"Fv\", nominal = 3.0 } }\n";
     let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
-    let drive = Model::open(bundled(ARM)).expect("the model").drives()[1].clone();
+    let drive = Model::open(bundled(ARM)).expect("the model").row_names()[1].clone();
     let text = format!("{text}\n{}", friction.replace("PLACE", &drive));
     let model = Model::from_text("with friction", &text).expect("the model");
     let file = run(ARM, 760, Made::Friction(1, 5.0, 7.0));
@@ -343,7 +343,7 @@ fn two_differences_between_recordings_are_named() {
     let disturbances = findings.diagnosis.disturbances.iter();
     let differences: Vec<_> = disturbances.filter(|one| one.kind == "different_runs").collect();
     let places: Vec<&[String]> = differences.iter().map(|one| &one.at[..]).collect();
-    assert_eq!(places, [&model.drives()[1..2], &model.drives()[2..3]]);
+    assert_eq!(places, [&model.row_names()[1..2], &model.row_names()[2..3]]);
     let values =
         |one: &modelmill::diagnose::Disturbance| -> Vec<f64> { one.estimates.iter().map(|v| v.value).collect() };
     for (one, truth) in differences.iter().zip([vec![8.0, 10.0], vec![1.3]]) {
@@ -358,7 +358,7 @@ fn two_differences_between_recordings_are_named() {
 #[test]
 fn a_value_that_joints_share_is_separated_where_one_differs() {
     let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
-    let drives = Model::open(bundled(ARM)).expect("the model").drives();
+    let drives = Model::open(bundled(ARM)).expect("the model").row_names();
     let kind = |kind: &str, places: &[String]| format!("\n[[effect]]\nkind = \"{kind}\"\nat = {places:?}\n");
     let text = format!(
         "{text}{}{}",

@@ -53,7 +53,7 @@ fn check_list<T: DeclaredOptions + PartialEq + std::fmt::Debug>() {
             }
             String::new()
         };
-        one.spell_help(&check);
+        one.format_help(&check);
         if let OptionKind::Choice { values } = &one.kind {
             // The first choice is the default of the library.
             let mut options = T::default();
@@ -63,7 +63,7 @@ fn check_list<T: DeclaredOptions + PartialEq + std::fmt::Debug>() {
             );
             assert_eq!(options, T::default(), "{}", one.name);
             for value in *values {
-                value.spell_help(&check);
+                value.format_help(&check);
                 assert_eq!(one.parse([value.flag]), Ok(OptionValue::Choice(value.name.to_owned())));
             }
         }
@@ -254,15 +254,16 @@ struct PythonKeyword {
 
 impl PythonKeyword {
     fn new<T: DeclaredOptions>(one: &OptionDeclaration<T>) -> Self {
-        let spell = |name: &str, value: Option<&str>| match (value, find_declaration::<T>(name).map(|one| &one.kind)) {
-            (None, _) => name.to_owned(),
-            (Some(value), Some(OptionKind::Columns { .. })) => {
-                let (ours, theirs) = parse_column(value).expect("a pair");
-                format!("{{\"{ours}\": \"{theirs}\"}}")
-            }
-            (Some(value), _) => format!("{name}=\"{value}\""),
-        };
-        let mut help = one.spell_help(&spell);
+        let write_reference =
+            |name: &str, value: Option<&str>| match (value, find_declaration::<T>(name).map(|one| &one.kind)) {
+                (None, _) => name.to_owned(),
+                (Some(value), Some(OptionKind::Columns { .. })) => {
+                    let (ours, theirs) = parse_column(value).expect("a pair");
+                    format!("{{\"{ours}\": \"{theirs}\"}}")
+                }
+                (Some(value), _) => format!("{name}=\"{value}\""),
+            };
+        let mut help = one.format_help(&write_reference);
         let optional = |described: &str, annotation: &str| {
             (described.to_owned(), format!("{annotation} | None"), "None".to_owned())
         };
@@ -280,7 +281,7 @@ impl PythonKeyword {
                 let meanings = values
                     .iter()
                     .zip(&names)
-                    .map(|(value, name)| format!("{name}: {}", value.spell_help(&spell)));
+                    .map(|(value, name)| format!("{name}: {}", value.format_help(&write_reference)));
                 help = format!("{help}. {}", meanings.collect::<Vec<_>>().join(". "));
                 (format!("{{{}}}", names.join(", ")), "str".to_owned(), names[0].clone())
             }

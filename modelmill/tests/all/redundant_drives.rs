@@ -54,7 +54,7 @@ fn jacobian([x, y, phi]: [f64; 3]) -> DMatrix<f64> {
 fn four_legs_move_three_freedoms() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/redundant/four_rrr.toml");
     let model = Model::from_text("four_rrr", &std::fs::read_to_string(file).unwrap()).expect("the model");
-    assert_eq!(model.drives(), ["on_x", "on_y", "on_phi"]);
+    assert_eq!(model.row_names(), ["on_x", "on_y", "on_phi"]);
     let (samples, step) = (900, 0.005);
     let time = |k: usize| step * k as f64;
     let columns: Vec<Vec<Vec<f64>>> = (0..3)
@@ -72,7 +72,7 @@ fn four_legs_move_three_freedoms() {
         load: Vec::new(),
     };
     let forces = ModelEvaluator::new(&model.derivation)
-        .inverse_dynamics(&states, &model.nominal)
+        .inverse_dynamics(&states, &model.values)
         .expect("forces");
     let mut text = "t,x,y,phi,x_d,y_d,phi_d,x_dd,y_dd,phi_dd,d1,d2,d3,d4".to_owned();
     for k in 0..samples {
@@ -108,7 +108,7 @@ fn four_legs_move_three_freedoms() {
         .identify(&[&recording], &[], &EstimatorOptions::default())
         .expect("a fit");
     // Rates and accelerations are recorded, so that only rounding is left.
-    for (parameter, truth) in found.fit.parameters.iter().zip(&model.nominal) {
+    for (parameter, truth) in found.fit.parameters.iter().zip(&model.values) {
         let error = (parameter.value - truth).abs();
         assert!(error < 1e-8, "{} instead of {truth}", parameter.value);
     }

@@ -97,7 +97,7 @@ impl RunPlan {
             qdd: of(2),
             load: Vec::new(),
         };
-        let mut forces = evaluator.inverse_dynamics(&motion, &machine.nominal).expect("forces");
+        let mut forces = evaluator.inverse_dynamics(&motion, &machine.values).expect("forces");
         for (d, force) in forces.iter_mut().enumerate() {
             // Drives of these arms are those of their joints, in the same order.
             self.add_friction(force, &states[d][1], &mut draws);
@@ -121,7 +121,7 @@ impl RunPlan {
                 ));
             }
         }
-        columns.extend(machine.drives().into_iter().zip(forces));
+        columns.extend(machine.row_names().into_iter().zip(forces));
         columns
     }
 
@@ -198,7 +198,7 @@ impl RunPlan {
 /// A bundled arm with dry and viscous friction of all drives and a further part, given as its entry in the model file.
 pub(crate) fn arm_with_friction(name: &str, part: &str) -> Model {
     let mut text = std::fs::read_to_string(bundled(name)).expect("a model");
-    let drives = Model::open(bundled(name)).expect("the model").drives();
+    let drives = Model::open(bundled(name)).expect("the model").row_names();
     for (d, drive) in drives.iter().enumerate() {
         for (kind, symbol) in [("coulomb_friction", "Fc"), ("viscous_friction", "Fv")] {
             let _ = write!(

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use modelmill::Model;
-use modelmill::print::LibrarySpelling;
+use modelmill::print::RustWording;
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::runs::{
     ChangeEstimate, KnownLoad, PerRunSelection, PhysicalChange, RunChange, RunsComparison, RunsOptions, UnreadRun,
@@ -130,7 +130,7 @@ fn drives_and_clocks_are_told_apart() {
         panic!("{found:#?}");
     };
     let model = Model::open(bundled("puma560")).expect("the model");
-    assert_eq!(*drive, model.drives()[2]);
+    assert_eq!(*drive, model.row_names()[2]);
     is_near(factor, 1.05, 0.01);
 
     let found = told("puma560", 700, Made::Offset(1, 4.0));
@@ -143,7 +143,7 @@ fn drives_and_clocks_are_told_apart() {
     else {
         panic!("{found:#?}");
     };
-    assert_eq!(*drive, model.drives()[1]);
+    assert_eq!(*drive, model.row_names()[1]);
     is_near(force, 4.0, 0.1);
 
     let found = told("puma560", 800, Made::Clock(1.02));
@@ -199,7 +199,7 @@ fn one_run_alone_is_refused() {
     assert!(error.to_string().contains("nowhere.csv"), "{error}");
     let found = runs(vec![Ok(&one), unread(), Ok(&one)]).expect("an answer");
     assert_eq!((found.runs.len(), found.unread.len()), (2, 1));
-    assert_eq!(found.json(&LibrarySpelling)["unread"][0]["file"], "nowhere.csv");
+    assert_eq!(found.json(&RustWording)["unread"][0]["file"], "nowhere.csv");
 }
 
 const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
@@ -224,7 +224,7 @@ fn a_push_is_told_with_its_times() {
     };
     assert!((from - 9.0).abs() < 0.3 && (to - 10.0).abs() < 0.3, "{found:#?}");
     let model = Model::open(bundled("puma560")).expect("the model");
-    let names = model.drives();
+    let names = model.row_names();
     assert!(
         drives.iter().all(|(drive, _)| [&names[1], &names[2]].contains(&drive)),
         "{drives:?}"
@@ -246,7 +246,7 @@ fn what_is_each_runs_own_is_told_in_one_fit() {
             .expect("the recording")
     };
     let [a, b, c] = files.each_ref().map(read);
-    let drive = &model.drives()[3];
+    let drive = &model.row_names()[3];
     let parse = |text: &str| PerRunSelection::parse(text).expect("a place");
     let asked = RunsOptions {
         per_run: vec![parse("payload@link6"), parse(&format!("friction@{drive}"))],
@@ -348,9 +348,9 @@ fn what_changed_and_stayed_is_told_with_its_run() {
     else {
         panic!("{:#?}", point.changes);
     };
-    assert_eq!(*drive, model.drives()[0]);
+    assert_eq!(*drive, model.row_names()[0]);
     is_near(dry, 5.0, 0.2);
-    let page = modelmill::report::runs_page(&found, &LibrarySpelling);
+    let page = modelmill::report::runs_page(&found, &RustWording);
     assert!(
         page.contains("From run 8 on") && page.contains("friction of"),
         "{}",

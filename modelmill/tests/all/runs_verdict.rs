@@ -2,7 +2,7 @@
 //! and "cannot tell" where the forces show nothing.
 
 use modelmill::Model;
-use modelmill::print::LibrarySpelling;
+use modelmill::print::RustWording;
 use modelmill::recording::PreparedRecording;
 use modelmill::runs::{KnownLoad, PhysicalChange, RunReport, RunVerdict, RunsComparison, RunsOptions};
 use modelmill::text::TerminalStyle;
@@ -142,12 +142,12 @@ fn runs_that_show_nothing_are_no_proof_of_no_change() {
     let second = &found.runs[1];
     assert_eq!(second.verdict(), RunVerdict::Undecided, "{second:#?}");
     assert!(second.moved.is_empty() && second.undecided.len() == 4, "{second:#?}");
-    let text = found.text(TerminalStyle::PLAIN, &LibrarySpelling);
+    let text = found.text(TerminalStyle::PLAIN, &RustWording);
     assert!(
         text.contains("cannot show whether anything changed") && !text.contains("No change found"),
         "{text}"
     );
-    assert_eq!(found.json(&LibrarySpelling)["runs"][1]["verdict"], "cannot_tell");
+    assert_eq!(found.json(&RustWording)["runs"][1]["verdict"], "cannot_tell");
 
     let standing = |seed: u64| RunPlan {
         motion: PlannedMotion::Stands,

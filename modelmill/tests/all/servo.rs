@@ -589,7 +589,7 @@ fn base_parameters_with_gains_agree_with_independent_ranks() {
         for offset in 0..5 {
             let (mut parameters, mut entries, mut columns) =
                 (vec!["[parameters]\n".to_owned()], String::new(), Vec::new());
-            for (d, drive) in bare.drives().iter().enumerate() {
+            for (d, drive) in bare.row_names().iter().enumerate() {
                 let kind = (d + offset + m) % 5;
                 let (entry, its) = test_actuator(kind, drive, &format!("gain{d}"));
                 let [a, b] = units(kind, bare.force_unit(d));
@@ -625,7 +625,7 @@ fn ranks(bare: &Model, actuators: &[Vec<GainColumn>], seed: u64) -> (usize, usiz
     let mut draws = Draws::new(seed);
     let n = 200;
     let [q, qd, qdd] = random_states(bare, &mut draws, n);
-    let drives = bare.drives().len();
+    let drives = bare.row_names().len();
     let load = vec![vec![0.0; n]; drives];
     let states = modelmill_codegen::MotionStates {
         q: q.iter().map(Vec::as_slice).collect(),

@@ -96,7 +96,7 @@ fn a_wrong_column_of_an_arm_is_named() {
         let sound = Table::made("puma560", seed);
         check(&sound, &model, None);
         let names = model.active_coordinates();
-        let drives = model.drives();
+        let drives = model.row_names();
         let degrees = 1.0_f64.to_degrees();
         check(&sound.scaled(&names[2], degrees), &model, Some((Units, &names[2])));
         check(&sound.scaled(&names[1], -1.0), &model, Some((WrongSign, &names[1])));
@@ -120,7 +120,7 @@ fn a_wrong_column_of_an_arm_is_named() {
 #[test]
 fn forces_that_were_not_measured_are_left_out() {
     let model = Model::open(bundled("two_link")).expect("a model");
-    let drives = model.drives();
+    let drives = model.row_names();
     let sound = Table::made("two_link", 5);
     let kinds = |read: &PreparedRecording| -> Vec<String> {
         let faults = read.segments.iter().flat_map(|one| &one.faults);
@@ -151,7 +151,7 @@ fn forces_that_were_not_measured_are_left_out() {
 #[test]
 fn a_number_that_repeats_is_stuck_though_the_joint_hardly_moves() {
     let model = Model::open(bundled("two_link")).expect("a model");
-    let (names, drives) = (model.active_coordinates(), model.drives());
+    let (names, drives) = (model.active_coordinates(), model.row_names());
     let sound = Table::made("two_link", 5);
     let (position, force) = (sound.place(&names[1]), sound.place(&drives[1]));
     let travel = |rows: &[Vec<f64>]| {
@@ -187,7 +187,7 @@ fn a_number_that_repeats_is_stuck_though_the_joint_hardly_moves() {
 #[test]
 fn a_force_that_is_cut_off_is_left_out_at_its_limit() {
     let model = Model::open(bundled("two_link")).expect("a model");
-    let drives = model.drives();
+    let drives = model.row_names();
     let sound = Table::made("two_link", 5);
     let place = sound.place(&drives[1]);
     let mut sizes: Vec<f64> = sound.rows.iter().map(|row| row[place].abs()).collect();
@@ -279,7 +279,7 @@ fn short_segments_between_gaps_are_left_out_of_a_diagnosis() {
 #[test]
 fn a_diagnosis_runs_on_the_corrected_recordings() {
     let model = Model::open(bundled("two_link")).expect("a model");
-    let (names, drives) = (model.active_coordinates(), model.drives());
+    let (names, drives) = (model.active_coordinates(), model.row_names());
     let [fit, check] = [3, 4].map(|seed| Table::made("two_link", seed));
     let spoilt = |table: &Table| table.scaled(&names[1], 1.0_f64.to_degrees()).scaled(&drives[0], 1e3);
     let diagnose = |fit: &Table, check: &Table| {

@@ -161,7 +161,7 @@ impl Plant<'_> {
         let forces: Vec<&[f64]> = load.iter().map(Vec::as_slice).collect();
         let found = self
             .evaluator
-            .forward_dynamics(&self.dynamics, &states, &self.model.nominal, &forces)
+            .forward_dynamics(&self.dynamics, &states, &self.model.values, &forces)
             .expect("accelerations");
         found.into_iter().map(|a| a[0]).collect()
     }
@@ -309,16 +309,16 @@ fn check(name: &str, text: &str, push: f64, accuracy: f64) {
         .expect("an identification");
     assert_eq!(found.fit.parameters.len(), model.base.len());
     for (k, parameter) in found.fit.parameters.iter().enumerate() {
-        let alike = model.base.iter().zip(&model.nominal);
+        let alike = model.base.iter().zip(&model.values);
         let alike = alike.filter(|(base, _)| base.unit == model.base[k].unit);
         let largest = alike.map(|(_, x)| x.abs()).fold(0.0, f64::max);
-        let error = (parameter.value - model.nominal[k]).abs() / largest;
+        let error = (parameter.value - model.values[k]).abs() / largest;
         assert!(
             error < accuracy,
             "{name}, {}: {} instead of {}, error {error:.1e}",
             model.base[k].expression,
             parameter.value,
-            model.nominal[k]
+            model.values[k]
         );
     }
 }
@@ -479,7 +479,7 @@ linear = { from = "A4", to = "B2" }
 #[test]
 fn cables_are_more_than_freedoms() {
     let model = Model::from_text("cables", CABLES).expect("the model");
-    assert_eq!(model.drives(), ["on_x", "on_y", "on_a"]);
+    assert_eq!(model.row_names(), ["on_x", "on_y", "on_a"]);
     let (samples, step) = (1500, 0.004);
     let motion = |k: usize, order: usize| -> [f64; 3] {
         let t = step * k as f64;
@@ -502,7 +502,7 @@ fn cables_are_more_than_freedoms() {
         load: Vec::new(),
     };
     let forces = ModelEvaluator::new(&model.derivation)
-        .inverse_dynamics(&states, &model.nominal)
+        .inverse_dynamics(&states, &model.values)
         .expect("forces");
     let mut text = "t,x,y,a,cable1,cable2,cable3,cable4".to_owned();
     for k in 0..samples {
@@ -547,7 +547,7 @@ fn cables_are_more_than_freedoms() {
     let found = model
         .identify(&[&recording], &[], &EstimatorOptions::default())
         .expect("a fit");
-    for (parameter, truth) in found.fit.parameters.iter().zip(&model.nominal) {
+    for (parameter, truth) in found.fit.parameters.iter().zip(&model.values) {
         let error = (parameter.value - truth).abs() / 0.05;
         assert!(error < 1e-2, "{} instead of {truth}", parameter.value);
     }
@@ -556,7 +556,7 @@ fn cables_are_more_than_freedoms() {
     let found =
         VariantComparison::along_recordings([&model, &model.clone()], [&[&recording], &[&recording]]).expect("figures");
     let drives: Vec<&str> = found.drives.iter().map(|one| &*one.drive).collect();
-    assert_eq!(drives, model.drives());
+    assert_eq!(drives, model.row_names());
     assert!(
         found.notes[0].says.in_library_words().contains("more drives than"),
         "{:?}",

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use modelmill::print::LibrarySpelling;
+use modelmill::print::RustWording;
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::variants::{DriveVariants, LimitCrossing, VariantComparison};
 use modelmill::{Model, NoteSeverity, along};
@@ -193,8 +193,8 @@ fn a_share_is_what_the_summand_alone_projects_on_the_difference() {
         .expect("a recording")
         .segments[0];
     let forces = |values: &[f64]| along::forces(&before, states, values).expect("forces");
-    let first = forces(&before.nominal);
-    let last = forces(&after.nominal);
+    let first = forces(&before.values);
+    let last = forces(&after.values);
     let mut seen = 0;
     for (d, drive) in found.drives.iter().enumerate() {
         shares_add_up(drive);
@@ -206,7 +206,7 @@ fn a_share_is_what_the_summand_alone_projects_on_the_difference() {
                 .iter()
                 .position(|b| b.retained == term.retained)
                 .expect("a base parameter");
-            let mut values = before.nominal.clone();
+            let mut values = before.values.clone();
             values[k] += term.after.expect("a value") - term.before.expect("a value");
             let part = forces(&values);
             let inner = part[d].iter().zip(&first[d]).zip(&whole).map(|((b, a), r)| (b - a) * r);
@@ -231,7 +231,7 @@ fn figures_are_those_of_evaluated_forces() {
         (&after, |one: &DriveVariants| one.after),
     ] {
         let forces = model
-            .evaluate(&file, &RecordingOptions::default(), &model.nominal)
+            .evaluate(&file, &RecordingOptions::default(), &model.values)
             .expect("forces");
         for (d, (drive, force)) in forces.columns.iter().enumerate() {
             assert_eq!(&found.drives[d].drive, drive);
@@ -254,7 +254,7 @@ fn figures_are_those_of_evaluated_forces() {
         let of_columns: f64 = terms.map(|term| (term.share - term.by_value).abs()).sum();
         assert!(of_columns > 1e-3, "{of_columns}");
     }
-    let json = found.json(&LibrarySpelling);
+    let json = found.json(&RustWording);
     let first = &json["drives"][0];
     assert_eq!(first["after"]["peak"].as_f64(), Some(found.drives[0].after.peak));
     assert_eq!(
@@ -335,7 +335,7 @@ fn other_columns_are_told_apart_and_errors_are_those_of_compare() {
         let run = model
             .recording(&file, &RecordingOptions::default())
             .expect("a recording");
-        let compared = model.compare(&[&run], &model.nominal).expect("figures");
+        let compared = model.compare(&[&run], &model.values).expect("figures");
         assert_eq!(errors.as_ref(), Some(&compared.figures));
     }
     // Another length: every column of the loop moves, and shares still add up.

@@ -140,18 +140,33 @@ impl FrameChain {
     }
 
     /// Solves for values at which the pairs coincide, by damped Gauss-Newton steps with a pseudoinverse. Returns the
-    /// largest remaining gap relative to the size.
-    pub(crate) fn close_pairs(&self, pairs: &[CoincidentPair], values: &mut [f64]) -> f64 {
+    /// largest remaining gap relative to the size, and the number of steps.
+    pub(crate) fn close_pairs(&self, pairs: &[CoincidentPair], values: &mut [f64]) -> (f64, usize) {
         /// Largest step of a variable, rad or m.
         const LONGEST_STEP: f64 = 0.2;
+        /// Steps after which the least gap has to be below [`LEAST_FALL`] times what it was.
+        const PATIENCE: usize = 40;
+        /// See [`PATIENCE`]. Steps towards a pose that exists lower the gap by far more.
+        const LEAST_FALL: f64 = 0.99;
         // Without a condition there is nothing to solve, and no matrix to decompose.
         if pairs.is_empty() {
-            return 0.0;
+            return (0.0, 0);
         }
         let mut left = f64::INFINITY;
-        for _ in 0..300 {
+        // The least gap so far, and what it was at the last check.
+        let (mut least, mut least_before) = (f64::INFINITY, f64::INFINITY);
+        let mut n_steps = 0;
+        while n_steps < 300 {
+            n_steps += 1;
             let (gaps, rows, size) = self.gaps(pairs, values);
             let now = gaps.amax() / size;
+            least = least.min(now);
+            if n_steps % PATIENCE == 0 {
+                if least > LEAST_FALL * least_before {
+                    return (now, n_steps);
+                }
+                least_before = least;
+            }
             // Close to rounding, a step that does not halve the gap is the last one.
             let is_idle = now >= 0.5 * left && now < 1e-12;
             left = now;
@@ -173,7 +188,7 @@ impl FrameChain {
                 *value -= scale * step;
             }
         }
-        left
+        (left, n_steps)
     }
 }
 

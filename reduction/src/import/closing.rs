@@ -24,6 +24,13 @@ const POORLY_CONDITIONED: f64 = 1e-2;
 pub(crate) const RANGE_TOLERANCE: f64 = 1e-9;
 /// Number of starting poses that are tried.
 const ATTEMPTS: usize = 200;
+/// Number of them near the pose of the description.
+const NEAR_ATTEMPTS: usize = 21;
+/// If a gap of more than this share of the size remains from all of them, no other pose is tried: two points are farther apart
+/// than the mechanism reaches.
+const FARTHEST_CLOSING_GAP: f64 = 0.9;
+/// Multiplications after which no further starting pose is tried: some seconds. Loops that close need a hundredth of it.
+const WORK_LIMIT: f64 = 1e10;
 
 /// Result of closing the loops.
 pub(crate) struct LoopSolution {
@@ -55,12 +62,13 @@ pub(crate) fn close_loops(
     let mut noise = PoseNoise(1);
     let (mut poses, mut outside): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
     let mut least = f64::INFINITY;
+    let (mut work, mut n_tried) = (0.0, 0);
     // The pose of the description first, then poses around it and farther away.
     for attempt in 0..ATTEMPTS {
         let spread = match attempt {
             0 => 0.0,
-            1..=20 => 0.1,
-            21..=40 => 0.4,
+            1..NEAR_ATTEMPTS => 0.1,
+            NEAR_ATTEMPTS..=40 => 0.4,
             _ => 1.5,
         };
         let mut values: Vec<f64> = start
@@ -77,8 +85,10 @@ pub(crate) fn close_loops(
             })
             .collect();
         // Solve from this pose; poses outside of the ranges are used only if there are no others.
-        let gap = chain.close_pairs(pairs, &mut values);
+        let (gap, n_steps) = chain.close_pairs(pairs, &mut values);
         least = least.min(gap);
+        n_tried += 1;
+        work += n_steps as f64 * decomposition_work(3 * pairs.len(), start.len());
         if gap < NEARLY_CLOSED {
             let is_inside = values.iter().zip(ranges).all(|(x, range)| {
                 range.is_none_or(|[low, high]| (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(x))
@@ -90,7 +100,8 @@ pub(crate) fn close_loops(
             }
         }
         // Six poses are enough to recognise a singular one.
-        if poses.len() == 6 {
+        let is_hopeless = n_tried == NEAR_ATTEMPTS && least > FARTHEST_CLOSING_GAP;
+        if poses.len() == 6 || is_hopeless || work > WORK_LIMIT {
             break;
         }
     }
@@ -100,7 +111,7 @@ pub(crate) fn close_loops(
     }
     if poses.is_empty() {
         return Err(format!(
-            "its loops do not close: {ATTEMPTS} starting poses were tried, and gaps of at least {least:.1e} of its size remain"
+            "its loops do not close: {n_tried} starting poses were tried, and gaps of at least {least:.1e} of its size remain"
         ));
     }
     // The largest rank of all poses is that of a general pose; singular poses have less.
@@ -139,7 +150,7 @@ pub(crate) fn close_loops(
     }
     // Close the independent pairs at the chosen pose.
     let mut values = poses.swap_remove(best);
-    let gap = chain.close_pairs(&pairs, &mut values);
+    let (gap, _) = chain.close_pairs(&pairs, &mut values);
     let mut pairs = pairs;
     // Points that miss each other by the digits of the description are redefined to coincide.
     if gap > CLOSED {
@@ -153,6 +164,12 @@ pub(crate) fn close_loops(
         gap: (gap > CLOSED).then_some(gap),
         conditions: [by_itself.sum(), wanted],
     })
+}
+
+/// Multiplications of a singular value decomposition of a matrix with vectors on both sides.
+fn decomposition_work(n_rows: usize, n_columns: usize) -> f64 {
+    let (less, more) = (n_rows.min(n_columns) as f64, n_rows.max(n_columns) as f64);
+    20.0 * less * less * more
 }
 
 /// Number of independent conditions of the pairs, and the smallest of their singular values relative to the largest.

@@ -88,7 +88,7 @@ impl Draft {
                 retain: Vec::new(),
                 limits: MotionLimits::default(),
                 recording: RecordingColumns::default(),
-                is_at_values: false,
+                has_numeric_constants: false,
             },
         }
     }

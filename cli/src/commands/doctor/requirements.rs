@@ -11,7 +11,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use modelmill::{Error, Host};
 use modelmill_recordings::MODELS;
 
-use crate::flags::FlagSpelling;
+use crate::flags::FlagWording;
 
 use super::programs::{find_program, find_program_of_value, find_version, is_at_least, read_output};
 
@@ -233,13 +233,13 @@ fn check_derivation() -> RequirementCheck {
 fn derive_bundled_model() -> Result<(), String> {
     // A host of its own: a wrong `--library` is no fault of the program.
     let host = Host::new();
-    let spell = |error: Error| error.spell(&FlagSpelling);
+    let text_of = |error: Error| error.format_for(&FlagWording);
     let (name, text) = MODELS[0];
-    let loaded = host.load_text(Path::new(name), text).map_err(spell)?;
+    let loaded = host.load_text(Path::new(name), text).map_err(text_of)?;
     let checked = host
         .derive(name, loaded)
         .and_then(|model| model.check())
-        .map_err(spell)?;
+        .map_err(text_of)?;
     match (&checked.rank, checked.warnings.first()) {
         (Some(_), None) => Ok(()),
         (_, Some(warning)) => Err(warning.clone()),

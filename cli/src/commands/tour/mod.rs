@@ -10,7 +10,7 @@ use std::sync::Arc;
 use modelmill::compare::ModelComparison;
 use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
 use modelmill::files::{FileError, FileSource, MemoryFiles, OpenFile, PathKind};
-use modelmill::print::{StepSpelling, edit};
+use modelmill::print::{StepWording, edit};
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::page;
 use modelmill::{Host, Model, along};
@@ -18,7 +18,7 @@ use modelmill_recordings::{BundledRuns, MODELS, PLAIN, WITH_RODS};
 
 use crate::args::TourArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::{CommandLineSpelling, quote_word};
+use crate::flags::{CommandLineWording, quote_word};
 use crate::output::{self, OutputSet};
 use crate::terminal;
 
@@ -179,22 +179,22 @@ impl TourFolder {
         Ok([read(runs.fit.0)?, read(runs.check.0)?])
     }
 
-    /// The spelling of commands that use the same recordings.
-    fn flags(&self, runs: &BundledRuns) -> CommandLineSpelling {
+    /// The wording of commands that use the same recordings.
+    fn flags(&self, runs: &BundledRuns) -> CommandLineWording {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
-        CommandLineSpelling::new(&[fit], &[check], &RecordingOptions::default())
+        CommandLineWording::new(&[fit], &[check], &RecordingOptions::default())
     }
 
     /// Adds the model with the effects that were found. Returns the commands that do the same, and the difference of
     /// the files.
-    fn add(&mut self, findings: &DiagnosisFindings, flags: &CommandLineSpelling) -> Option<(Vec<String>, String)> {
+    fn add(&mut self, findings: &DiagnosisFindings, flags: &CommandLineWording) -> Option<(Vec<String>, String)> {
         let edited = findings.edited.as_ref()?;
         self.add_file(EDITED, edited.text.as_str());
         let model = &findings.before.model;
         // The bundled recordings show one effect, and the tour keeps the given model file.
         let target = format!(" --out {}", self.name(EDITED));
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.spell_effect(model, entry).replace(" --in-place", &target));
+        let commands = commands.map(|entry| flags.format_effect(model, entry).replace(" --in-place", &target));
         let commands = commands.collect();
         // File names of the difference, as `diff` prints them.
         let names = ["spidermill.toml", EDITED];
@@ -230,14 +230,14 @@ impl TourComparison {
             .ok_or_else(|| CommandFailure::Input("the bundled recording has no samples".to_owned()))?;
         let measured = along::measured_forces(one)?;
         // Samples of forces and measurements must agree, so both are decimated alike.
-        let forces = along::filter_and_decimate(along::forces(model, one, &model.nominal)?, one)?;
+        let forces = along::filter_and_decimate(along::forces(model, one, &model.values)?, one)?;
         let errors = measured
             .iter()
             .zip(&forces)
             .map(|(y, m)| y.iter().zip(m).map(|(y, m)| y - m).collect())
             .collect();
         Ok(Self {
-            compared: model.compare(&[recording], &model.nominal)?,
+            compared: model.compare(&[recording], &model.values)?,
             time: one.time(),
             measured,
             errors,

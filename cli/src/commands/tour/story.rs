@@ -77,8 +77,9 @@ impl TourText {
             "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
              model file has {} (two cranks and two couplers), {} and {}. The elbows and the platform are point masses. The screws \
              are the drives spindle_left and spindle_right. The angles of the cranks are theta1 and theta2; those of the couplers, \
-             relative to the cranks, are gamma1 and gamma2. The forces of the screws are linear in {} of masses, lengths and \
-             inertias. Many of these products always act together. Measurements can determine only {} combinations of them, the \
+             relative to the cranks, are gamma1 and gamma2. The lengths d1 and d3 are known; masses, centres of mass (dc1, dc3) and \
+             inertias are unknown. The forces of the screws are linear in {} of unknown parameters, such as m1*dc1. Many of these \
+             products always act together. Measurements can determine only {} combinations of them, the \
              base parameters. modelmill finds these symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
@@ -108,7 +109,7 @@ impl TourText {
             percent(seen.compared.figures.nrms)
         ));
         // The curves of the first drive are an example; the table below lists where all errors are largest.
-        let drive = model.drives().first().cloned().unwrap_or_default();
+        let drive = model.row_names().first().cloned().unwrap_or_default();
         if let (Some(measured), Some(error)) = (seen.measured.first(), seen.errors.first()) {
             // Measured force and error have separate scales, because the error is much smaller.
             for (title, values, height) in [
@@ -301,7 +302,7 @@ impl TourText {
              Each coupler carries half of the platform's mass m4 as a point mass, but the equations of the paper use two different \
              points for it. In the balance of forces it is at the end of the coupler (R3m or R3m_right). In the balance of moments it is at the \
              coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines this cause and those of the paper. The \
-             recording is a simulation of the same robot without rods. The base parameters are fixed at their nominal values \
+             recording is a simulation of the same robot whose screws have no mass. The base parameters are fixed at their nominal values \
              (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));

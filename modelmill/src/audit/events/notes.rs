@@ -34,7 +34,7 @@ pub(in crate::audit) fn event_notes(model: &Model, data: &mut RecordingSegment, 
 
 /// The note on an event: a warning, or a hint if it is only possible.
 fn event_note(model: &Model, file: &str, event: &ContactEvent, leave_out: bool) -> RecordingNote {
-    let names = model.drives();
+    let names = model.row_names();
     let drives: Vec<String> = event
         .drives
         .iter()
@@ -72,7 +72,7 @@ fn event_note(model: &Model, file: &str, event: &ContactEvent, leave_out: bool) 
 
 /// An event as a disturbance for the diagnosis.
 pub(crate) fn event_disturbance(model: &Model, file: &str, event: &ContactEvent) -> Disturbance {
-    let names = model.drives();
+    let names = model.row_names();
     let drives = event.drives.iter();
     Disturbance {
         kind: "contact_event".to_owned(),

@@ -110,7 +110,7 @@ impl EventRows {
         let [_, rates, accelerations] = &motion;
         let rows = with_friction_columns(rows, rates, accelerations);
         rows.iter().all(|x| x.is_finite()).then(|| Self {
-            regressor: ChannelRegressor::new(&rows, model.drives().len()),
+            regressor: ChannelRegressor::new(&rows, model.row_names().len()),
             motion,
         })
     }

@@ -52,7 +52,7 @@ pub(super) fn compare_forces(
     };
     let total: usize = segments.iter().map(RecordingSegment::samples).sum();
     let step = (total / FIT_MOST_SAMPLES).max(1);
-    let n_drives = model.drives().len();
+    let n_drives = model.row_names().len();
     let mut rows: Vec<DMatrix<f64>> = Vec::new();
     let mut nominal: Vec<Vec<f64>> = vec![Vec::new(); n_drives];
     let parameters = nominal_parameters(model);
@@ -104,7 +104,7 @@ pub(super) fn compare_forces(
 /// The nominal values of all base parameters; `None` if one has none.
 fn nominal_parameters(model: &Model) -> Option<DVector<f64>> {
     let values = model.nominal_values().values;
-    let is_known = (0..values.len()).all(|k| model.has_nominal(k));
+    let is_known = (0..values.len()).all(|k| model.has_values(k));
     is_known.then(|| DVector::from_vec(values))
 }
 

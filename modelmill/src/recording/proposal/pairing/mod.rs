@@ -400,7 +400,7 @@ impl<'a> ColumnPairing<'a> {
 
     /// Compares forces with the model, where all positions are known; pairs those that have none by it.
     fn pair_forces_by_fit(&mut self) -> Outcome {
-        let drives = self.model.drives();
+        let drives = self.model.row_names();
         let rows: Vec<Option<usize>> = (0..self.ours.len())
             .map(|i| drives.iter().position(|drive| *drive == self.ours[i].name))
             .collect();

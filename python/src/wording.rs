@@ -1,29 +1,29 @@
-//! Spelling of the library's advice for Python: options as keywords, commands as methods.
+//! Wording of the library's advice for Python: options as keywords, commands as methods.
 
 use std::fmt::Write as _;
 
 use modelmill::Model;
 use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
-use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
+use modelmill::print::{CommandName, OptionName, OptionSetting, RemedyWording, StepWording};
 use pyo3::prelude::*;
 
-/// Spells advice as keywords and as calls of methods of a model `m`.
-pub(crate) struct PythonSpelling;
+/// Writes advice as keywords and as calls of methods of a model `m`.
+pub(crate) struct PythonWording;
 
-impl RemedySpelling for PythonSpelling {
-    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+impl RemedyWording for PythonWording {
+    fn format_options(&self, settings: &[OptionSetting]) -> String {
         let all: Vec<String> = settings.iter().map(argument).collect();
         all.join(" ")
     }
 
-    fn spell_command(&self, command: CommandName) -> String {
+    fn format_command(&self, command: CommandName) -> String {
         format!("`{}()`", method_of_command(command))
     }
 }
 
-impl StepSpelling for PythonSpelling {
-    fn spell_effect(&self, _: &Model, effect: &NewEffect) -> String {
+impl StepWording for PythonWording {
+    fn format_effect(&self, _: &Model, effect: &NewEffect) -> String {
         let mut call = format!("m.with_effect({:?}, {}", effect.kind, places(&effect.at));
         let parameters = effect.parameters.iter();
         let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
@@ -34,15 +34,15 @@ impl StepSpelling for PythonSpelling {
         call + ")"
     }
 
-    fn spell_completion(&self) -> String {
+    fn format_completion(&self) -> String {
         "`model` of this diagnosis has all of them; `model.save(\"completed.toml\")` writes its file".to_owned()
     }
 
-    fn spell_identification(&self, _: &Model) -> String {
+    fn format_identification(&self, _: &Model) -> String {
         "m.identify(data)".to_owned()
     }
 
-    fn spell_separation(&self, _: &Model, separation: &SeparationProposal) -> Option<String> {
+    fn format_separation(&self, _: &Model, separation: &SeparationProposal) -> Option<String> {
         let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
@@ -90,7 +90,7 @@ enum PythonName {
 }
 
 /// The keyword or method of an option.
-fn spelled_option(option: OptionName) -> PythonName {
+fn option_name_in_python(option: OptionName) -> PythonName {
     match option {
         OptionName::From => PythonName::Keyword("apart_from"),
         OptionName::Out => PythonName::Method("save"),
@@ -110,7 +110,7 @@ fn method_of_command(command: CommandName) -> &'static str {
 /// An option as an argument, or as a call.
 fn argument(setting: &OptionSetting) -> String {
     let value = setting.value.as_deref();
-    let keyword = match spelled_option(setting.name) {
+    let keyword = match option_name_in_python(setting.name) {
         PythonName::Keyword(keyword) => keyword,
         PythonName::Method(method) => {
             let value = value.map(|value| format!("{value:?}"));
@@ -139,7 +139,7 @@ pub(crate) fn advised_names() -> (Vec<&'static str>, Vec<&'static str>) {
     let mut keywords = Vec::new();
     let mut methods: Vec<&str> = CommandName::ALL.iter().map(|c| method_of_command(*c)).collect();
     for option in OptionName::ALL {
-        match spelled_option(*option) {
+        match option_name_in_python(*option) {
             PythonName::Keyword(keyword) => keywords.push(keyword),
             PythonName::Method(method) => methods.push(method),
         }

@@ -1,12 +1,12 @@
 //! Formats remedies and recommended next steps for the reader: as commands, as Python calls, or in words for a caller
 //! of the Rust library.
 //!
-//! [`RemedySpelling`] formats remedies within messages, [`StepSpelling`] complete steps with a model.
+//! [`RemedyWording`] formats remedies within messages, [`StepWording`] complete steps with a model.
 
 use std::fmt::Write as _;
 
 pub use modelmill_boundary::text::{
-    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling,
+    CommandName, Message, OptionName, OptionSetting, Remedy, RemedyWording, RustWording,
 };
 use modelmill_spec::edit::NewEffect;
 
@@ -15,13 +15,13 @@ use crate::model::Model;
 
 /// Formats the recommended next steps after a diagnosis for the reader. The program writes commands, the Python package
 /// writes calls. Each method returns the text of one step and does not perform it.
-pub trait StepSpelling: RemedySpelling {
+pub trait StepWording: RemedyWording {
     /// Step: add an effect to the file of a model.
-    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String;
+    fn format_effect(&self, model: &Model, effect: &NewEffect) -> String;
 
     /// Step: add an effect whose kind is defined in the library file `library`.
-    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        let effect = self.spell_effect(model, effect);
+    fn format_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        let effect = self.format_effect(model, effect);
         format!("{effect}, with the library {library}")
     }
 
@@ -31,18 +31,18 @@ pub trait StepSpelling: RemedySpelling {
     }
 
     /// Step: add all effects found at once.
-    fn spell_completion(&self) -> String;
+    fn format_completion(&self) -> String;
 
     /// Step: identify a model again from the same recordings.
-    fn spell_identification(&self, model: &Model) -> String;
+    fn format_identification(&self, model: &Model) -> String;
 
     /// Step: plan a motion that distinguishes effects; `None` if the reader has no command for it.
-    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
+    fn format_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 }
 
 /// Plain words for a caller of the Rust library `modelmill`; the name does not refer to a library of effects.
-impl StepSpelling for LibrarySpelling {
-    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+impl StepWording for RustWording {
+    fn format_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut says = format!("{}: add {} at {}", model.name, effect.kind, effect.at.join(", "));
         let parameters = effect.parameters.iter();
         let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
@@ -54,15 +54,15 @@ impl StepSpelling for LibrarySpelling {
         says
     }
 
-    fn spell_completion(&self) -> String {
+    fn format_completion(&self) -> String {
         "`DiagnosisFindings::completed_model` has all of them".to_owned()
     }
 
-    fn spell_identification(&self, model: &Model) -> String {
+    fn format_identification(&self, model: &Model) -> String {
         format!("{}: identify again", model.name)
     }
 
-    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+    fn format_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let effect = &separation.effect.effect;
         let rivals: Vec<&str> = separation.rivals.iter().map(|r| r.kind.as_str()).collect();
         Some(format!(
