@@ -13,6 +13,7 @@ use std::fmt;
 
 use num_traits::ToPrimitive;
 
+use crate::actuators::{ModelActuator, SignalQuantity};
 use crate::column_unit::{split_header_unit, unit_factor};
 use crate::diagnostic::{DiagnosticLog, SourceSpan};
 use crate::exact::ExactFunction;
@@ -42,6 +43,12 @@ pub enum ColumnQuantity {
     ForceVariance,
     /// The variance of a torque, (N m)^2.
     TorqueVariance,
+    /// A current, A.
+    Current,
+    /// A voltage, V.
+    Voltage,
+    /// A pressure, Pa.
+    Pressure,
 }
 
 /// `offset + sum of factor * column`, in SI units.
@@ -97,7 +104,17 @@ const TURN: f64 = std::f64::consts::TAU;
 pub(crate) fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
     match quantity {
         ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0)],
-        ColumnQuantity::Number => &[("1", 1.0)],
+        ColumnQuantity::Number => &[("1", 1.0), ("%", 1e-2)],
+        ColumnQuantity::Current => &[("A", 1.0), ("mA", 1e-3)],
+        ColumnQuantity::Voltage => &[("V", 1.0), ("mV", 1e-3)],
+        ColumnQuantity::Pressure => &[
+            ("Pa", 1.0),
+            ("bar", 1e5),
+            ("mbar", 1e2),
+            ("kPa", 1e3),
+            ("MPa", 1e6),
+            ("psi", 6894.757_293_168),
+        ],
         ColumnQuantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
         ColumnQuantity::Angle(1) => &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", TURN / 60.0), ("rev/s", TURN)],
         ColumnQuantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
@@ -129,7 +146,16 @@ impl Mechanism {
     pub fn columns(&self) -> Vec<(String, ColumnQuantity)> {
         let mut columns = vec![("t".to_owned(), ColumnQuantity::Time)];
         for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
+            let signal = self
+                .actuators
+                .iter()
+                .find(|actuator| actuator.signal == coordinate.name);
             for (order, suffix) in (0..).zip(["", "_d", "_dd"]) {
+                // In the equations of servos, signals are coordinates.
+                if let (0, Some(signal)) = (order, signal) {
+                    columns.push((signal.signal.clone(), self.signal_column(signal)));
+                    continue;
+                }
                 let quantity = match coordinate.motion {
                     CoordinateMotion::Revolute => ColumnQuantity::Angle(order),
                     CoordinateMotion::Prismatic => ColumnQuantity::Length(order),
@@ -149,15 +175,25 @@ impl Mechanism {
             columns.push((drive.name.clone(), force));
             columns.push((format!("{}_var", drive.name), variance));
         }
-        // In the equations of servos, signals are coordinates already.
         for actuator in self.actuators.iter().filter(|_| self.servo_forces.is_empty()) {
-            let quantity = match actuator.motion {
-                CoordinateMotion::Revolute => ColumnQuantity::Angle(0),
-                _ => ColumnQuantity::Length(0),
-            };
-            columns.push((actuator.signal.clone(), quantity));
+            columns.push((actuator.signal.clone(), self.signal_column(actuator)));
         }
         columns
+    }
+
+    /// The quantity in the column of the signal of an actuator.
+    fn signal_column(&self, actuator: &ModelActuator) -> ColumnQuantity {
+        let load = self.drives[actuator.drive.0].kind.place_load(&self.coordinates);
+        match (actuator.quantity, load) {
+            (SignalQuantity::Position, PlaceLoad::Torque) => ColumnQuantity::Angle(0),
+            (SignalQuantity::Position, _) => ColumnQuantity::Length(0),
+            (SignalQuantity::Rate, PlaceLoad::Torque) => ColumnQuantity::Angle(1),
+            (SignalQuantity::Rate, _) => ColumnQuantity::Length(1),
+            (SignalQuantity::Current, _) => ColumnQuantity::Current,
+            (SignalQuantity::Voltage, _) => ColumnQuantity::Voltage,
+            (SignalQuantity::Share, _) => ColumnQuantity::Number,
+            (SignalQuantity::Pressure, _) => ColumnQuantity::Pressure,
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::column::{ColumnQuantity, units};
 
 /// All quantities that have units, for the question whether a text is a unit at all.
-const QUANTITIES: [ColumnQuantity; 11] = [
+const QUANTITIES: [ColumnQuantity; 14] = [
     ColumnQuantity::Time,
     ColumnQuantity::Angle(0),
     ColumnQuantity::Angle(1),
@@ -15,11 +15,14 @@ const QUANTITIES: [ColumnQuantity; 11] = [
     ColumnQuantity::Torque,
     ColumnQuantity::ForceVariance,
     ColumnQuantity::TorqueVariance,
+    ColumnQuantity::Current,
+    ColumnQuantity::Voltage,
+    ColumnQuantity::Pressure,
 ];
 
-/// Units of signals that no column of a model has, such as motor currents.
-const OTHER_UNITS: [&str; 16] = [
-    "A", "mA", "V", "mV", "W", "J", "Hz", "%", "1", "inc", "counts", "ticks", "C", "K", "kg", "Arms",
+/// Units of signals that no column of a model has, such as powers.
+const OTHER_UNITS: [&str; 12] = [
+    "W", "J", "Hz", "%", "1", "inc", "counts", "ticks", "C", "K", "kg", "Arms",
 ];
 
 /// Spellings of units, each with the one that the tables of units have. Longer ones come first.
@@ -73,8 +76,8 @@ pub fn unit_factor(unit: &str, quantity: ColumnQuantity) -> Option<f64> {
 /// A unit as the tables of units spell it.
 fn usual_spelling(unit: &str) -> String {
     let mut usual = unit.trim().to_owned();
-    for (other, wording) in SPELLINGS {
-        usual = usual.replace(other, wording);
+    for (other, usual_one) in SPELLINGS {
+        usual = usual.replace(other, usual_one);
     }
     // The power of `rad/s2`.
     if usual.ends_with("/s2") {

@@ -54,7 +54,7 @@ mod unit;
 mod values;
 mod words;
 
-pub use actuators::{ActuatorGain, ActuatorKind, ActuatorTerm, ModelActuator, ServoForce};
+pub use actuators::{ActuatorGain, ActuatorKind, ActuatorTerm, ModelActuator, ServoForce, SignalQuantity};
 pub use additions::{AddedEffect, ConstantValue};
 pub use column::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
 pub use column_unit::{split_header_unit, unit_factor};

@@ -366,9 +366,10 @@ record! {
         "name" name: optional SpannedName,
         /// The drive whose force it makes.
         "drive" drive: required SpannedName,
-        /// `position_servo`, `velocity_servo`, `current`, `voltage` or `duty`.
+        /// `position_servo`, `velocity_servo`, `current`, `voltage`, `duty` or `hydraulic_cylinder`.
         "kind" kind: required ActuatorKind,
-        /// Name of the recorded signal; that of the drive with `_command`, `_current`, `_voltage` or `_duty` if omitted.
+        /// Name of the recorded signal; that of the drive with `_command`, `_current`, `_voltage` or `_duty` if omitted. The
+        /// two of a `hydraulic_cylinder` are that of the drive with `_pressure_a` and `_pressure_b`.
         "signal" signal: optional SpannedName,
         /// Position gain of a `position_servo`, N m/rad or N/m.
         "kp" kp: optional SourceFormula,
@@ -388,6 +389,11 @@ record! {
         "back_emf" back_emf: optional SourceFormula,
         /// Voltage at a duty cycle of 1, V.
         "supply" supply: optional SourceFormula,
+        /// Area of the chamber of a `hydraulic_cylinder` whose pressure acts in the direction of the drive, m^2; of a
+        /// hydraulic motor its displacement, m^3/rad.
+        "area_a" area_a: optional SourceFormula,
+        /// Area of the opposite chamber, m^2 or m^3/rad; none if omitted.
+        "area_b" area_b: optional SourceFormula,
         /// Delay from the recorded signal to the force, s; estimated if omitted.
         "delay" delay: optional SpannedNumber,
         /// Largest absolute force of the actuator, N m or N; none if omitted.
@@ -395,6 +401,9 @@ record! {
         /// Largest absolute error of position at which a `position_servo` makes no force, rad or m; the force follows the
         /// error beyond it. 0 if omitted.
         "dead_band" dead_band: optional SpannedNumber,
+        /// Largest rate at which a `position_servo` or `velocity_servo` follows its command, in units of the command per
+        /// second; none if omitted.
+        "rate_limit" rate_limit: optional SpannedNumber,
         /// Remark.
         "note" note: optional SpannedText,
     }

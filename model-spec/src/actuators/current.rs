@@ -1,7 +1,7 @@
 //! A motor whose current is recorded: the drive force is proportional to it.
 
 use super::voltage::PER_AMPERE;
-use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, constant, gain, signal};
+use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, SignalQuantity, constant, gain, signal};
 use crate::unit::UnitDimension;
 
 /// See [`super::ActuatorKind::Current`].
@@ -16,8 +16,12 @@ impl ActuatorKindEntry for CurrentDrive {
         "torque_constant*ratio*efficiency*current"
     }
 
-    fn signal(&self) -> &'static str {
-        "current"
+    fn signals(&self) -> &'static [&'static str] {
+        &["current"]
+    }
+
+    fn quantity(&self) -> SignalQuantity {
+        SignalQuantity::Current
     }
 
     fn is_commanded(&self) -> bool {
@@ -34,7 +38,7 @@ impl ActuatorKindEntry for CurrentDrive {
         }
     }
 
-    fn terms(&self, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
+    fn terms(&self, _: usize, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
         let all = ["torque_constant", "ratio", "efficiency"].into_iter().filter_map(gain);
         let product = all.fold(ActuatorGain::unity(), |product, one| product.times(&one));
         vec![product.term(signal())]

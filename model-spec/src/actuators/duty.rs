@@ -1,7 +1,7 @@
 //! A motor with a recorded duty cycle, -1 to 1, of a known supply voltage.
 
 use super::voltage::{BACK_EMF, OHM, PER_AMPERE, VOLT};
-use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, constant, gain, motor_terms};
+use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, SignalQuantity, constant, gain, motor_terms};
 use crate::unit::UnitDimension;
 
 /// See [`super::ActuatorKind::Duty`].
@@ -16,8 +16,12 @@ impl ActuatorKindEntry for DutyDrive {
         "torque_constant*ratio*efficiency/resistance*(supply*duty - back_emf*ratio*rate)"
     }
 
-    fn signal(&self) -> &'static str {
-        "duty"
+    fn signals(&self) -> &'static [&'static str] {
+        &["duty"]
+    }
+
+    fn quantity(&self) -> SignalQuantity {
+        SignalQuantity::Share
     }
 
     fn is_commanded(&self) -> bool {
@@ -37,7 +41,7 @@ impl ActuatorKindEntry for DutyDrive {
         }
     }
 
-    fn terms(&self, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
+    fn terms(&self, _: usize, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
         motor_terms(gain)
     }
 }

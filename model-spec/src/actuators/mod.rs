@@ -11,6 +11,7 @@
 mod current;
 mod duty;
 mod equations;
+mod hydraulic_cylinder;
 mod position_servo;
 mod velocity_servo;
 mod voltage;
@@ -37,16 +38,19 @@ words! {
     "voltage" => Voltage,
     /// A motor with a recorded duty cycle of a known supply.
     "duty" => Duty,
+    /// A cylinder with the pressures of its two chambers, or a hydraulic motor.
+    "hydraulic_cylinder" => HydraulicCylinder,
 }
 
 impl ActuatorKind {
     /// All kinds, in the order of the documentation.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::PositionServo,
         Self::VelocityServo,
         Self::Current,
         Self::Voltage,
         Self::Duty,
+        Self::HydraulicCylinder,
     ];
 
     /// The word of model files.
@@ -59,9 +63,9 @@ impl ActuatorKind {
         self.entry().formula()
     }
 
-    /// The recorded quantity: `command`, `current`, `voltage` or `duty`.
-    pub fn signal(self) -> &'static str {
-        self.entry().signal()
+    /// The recorded quantities, such as `command` or `current`.
+    pub fn signals(self) -> &'static [&'static str] {
+        self.entry().signals()
     }
 
     /// Whether the recorded quantity is a command, which contains no noise of the sensors.
@@ -77,6 +81,7 @@ impl ActuatorKind {
             Self::Current => &current::CurrentDrive,
             Self::Voltage => &voltage::VoltageDrive,
             Self::Duty => &duty::DutyDrive,
+            Self::HydraulicCylinder => &hydraulic_cylinder::HydraulicCylinder,
         }
     }
 }
@@ -87,18 +92,21 @@ pub(crate) trait ActuatorKindEntry: Sync {
     fn name(&self) -> &'static str;
     /// See [`ActuatorKind::formula`].
     fn formula(&self) -> &'static str;
-    /// See [`ActuatorKind::signal`].
-    fn signal(&self) -> &'static str;
+    /// See [`ActuatorKind::signals`].
+    fn signals(&self) -> &'static [&'static str];
+    /// What is recorded. Commands have the unit of the drive's coordinate or of its rate.
+    fn quantity(&self) -> SignalQuantity;
     /// See [`ActuatorKind::is_commanded`].
     fn is_commanded(&self) -> bool;
-    /// Whether the signal has the unit of the drive's coordinate, so that angles have no jumps.
-    fn is_position(&self) -> bool {
-        false
+    /// Delay of its signals if the file gives none, s; `None` if it is estimated.
+    fn usual_delay(&self) -> Option<f64> {
+        None
     }
     /// The gains and constants of the kind.
     fn gains(&self) -> &'static [GainEntry];
-    /// The force as terms; `gain` returns the gain of a key, `None` if the file omits it.
-    fn terms(&self, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm>;
+    /// The part of the force that depends on one of [`Self::signals`], as terms. `gain` returns the gain of a key, `None` if
+    /// the file omits it.
+    fn terms(&self, signal: usize, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm>;
 }
 
 /// A gain or constant that a kind of actuator has.
@@ -140,13 +148,15 @@ impl GainEntry {
             "resistance" => &entry.resistance,
             "back_emf" => &entry.back_emf,
             "supply" => &entry.supply,
+            "area_a" => &entry.area_a,
+            "area_b" => &entry.area_b,
             _ => return None,
         };
         formula.clone()
     }
 
     /// The keys of all gains.
-    pub(crate) const KEYS: [&'static str; 9] = [
+    pub(crate) const KEYS: [&'static str; 11] = [
         "kp",
         "kd",
         "kv",
@@ -156,6 +166,8 @@ impl GainEntry {
         "resistance",
         "back_emf",
         "supply",
+        "area_a",
+        "area_b",
     ];
 }
 
@@ -263,6 +275,8 @@ pub struct ModelActuator {
     pub signal: String,
     /// Kind of motion of the signal: that of the drive's coordinate for positions, a length for all others.
     pub motion: CoordinateMotion,
+    /// What the signal is.
+    pub quantity: SignalQuantity,
     /// Terms of its force.
     pub terms: Vec<ActuatorTerm>,
     /// Known delay of the signal, s; `None` if it is unknown.
@@ -271,13 +285,33 @@ pub struct ModelActuator {
     pub saturation: Option<f64>,
     /// Largest absolute error of position without a force, rad or m; `None` without a dead band.
     pub dead_band: Option<f64>,
+    /// Largest rate at which the servo follows a command, rad/s or m/s (for a `velocity_servo` rad/s^2 or m/s^2); `None`
+    /// without a limit.
+    pub rate_limit: Option<f64>,
+}
+
+/// What the signal of an actuator is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SignalQuantity {
+    /// A position to reach, in the unit of the drive's coordinate.
+    Position,
+    /// A rate to reach, in the unit of the rate of the drive's coordinate.
+    Rate,
+    /// A current, A.
+    Current,
+    /// A voltage, V.
+    Voltage,
+    /// A share of the supply, -1 to 1.
+    Share,
+    /// A pressure, Pa.
+    Pressure,
 }
 
 impl ModelActuator {
     /// The signal that has the same effect on a servo without a dead band: the position inside the band, and the error
     /// beyond it outside.
     pub fn effective_signal(&self, signal: f64, position: f64) -> f64 {
-        if !self.kind.entry().is_position() {
+        if self.quantity != SignalQuantity::Position {
             return signal;
         }
         let error = signal - position;
@@ -289,7 +323,7 @@ impl ModelActuator {
 
     /// Whether its force depends on the error of a position.
     pub fn has_position_error(&self) -> bool {
-        self.kind.entry().is_position()
+        self.quantity == SignalQuantity::Position
     }
 
     /// A force after the saturation of the actuator.

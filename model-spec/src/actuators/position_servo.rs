@@ -1,6 +1,6 @@
 //! A position controller: the drive force is proportional to the error of position, less a damping.
 
-use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, difference, gain, rate, signal};
+use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, SignalQuantity, difference, gain, rate, signal};
 use crate::exact::{ExactExpression, ModelSymbol, PlaceQuantity};
 use crate::unit::UnitDimension;
 
@@ -16,15 +16,15 @@ impl ActuatorKindEntry for PositionServo {
         "kp*(command - position) - kd*rate + kv*(command rate - rate)"
     }
 
-    fn signal(&self) -> &'static str {
-        "command"
+    fn signals(&self) -> &'static [&'static str] {
+        &["command"]
+    }
+
+    fn quantity(&self) -> SignalQuantity {
+        SignalQuantity::Position
     }
 
     fn is_commanded(&self) -> bool {
-        true
-    }
-
-    fn is_position(&self) -> bool {
         true
     }
 
@@ -38,7 +38,7 @@ impl ActuatorKindEntry for PositionServo {
         }
     }
 
-    fn terms(&self, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
+    fn terms(&self, _: usize, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
         let place = |quantity| ExactExpression::Symbol(ModelSymbol::Place(quantity));
         let kp = gain("kp").map(|kp| kp.term(difference(signal(), place(PlaceQuantity::Coordinate))));
         let kd = gain("kd").map(|kd| kd.term(ExactExpression::Negative(Box::new(rate()))));

@@ -1,6 +1,6 @@
 //! A velocity controller: the drive force is proportional to the error of the rate.
 
-use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, difference, gain, rate, signal};
+use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, SignalQuantity, difference, gain, rate, signal};
 use crate::unit::UnitDimension;
 
 /// See [`super::ActuatorKind::VelocityServo`].
@@ -15,8 +15,12 @@ impl ActuatorKindEntry for VelocityServo {
         "kv*(command - rate)"
     }
 
-    fn signal(&self) -> &'static str {
-        "command"
+    fn signals(&self) -> &'static [&'static str] {
+        &["command"]
+    }
+
+    fn quantity(&self) -> SignalQuantity {
+        SignalQuantity::Rate
     }
 
     fn is_commanded(&self) -> bool {
@@ -27,7 +31,7 @@ impl ActuatorKindEntry for VelocityServo {
         const { &[gain("kv", true, UnitDimension::TIME, -1)] }
     }
 
-    fn terms(&self, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
+    fn terms(&self, _: usize, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
         let kv = gain("kv").map(|kv| kv.term(difference(signal(), rate())));
         kv.into_iter().collect()
     }

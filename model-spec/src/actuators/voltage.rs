@@ -1,6 +1,6 @@
 //! A motor whose voltage is recorded: the current follows from the resistance and the back-EMF.
 
-use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, constant, gain, motor_terms};
+use super::{ActuatorGain, ActuatorKindEntry, ActuatorTerm, GainEntry, SignalQuantity, constant, gain, motor_terms};
 use crate::unit::UnitDimension;
 
 /// See [`super::ActuatorKind::Voltage`].
@@ -34,8 +34,12 @@ impl ActuatorKindEntry for VoltageDrive {
         "torque_constant*ratio*efficiency/resistance*(voltage - back_emf*ratio*rate)"
     }
 
-    fn signal(&self) -> &'static str {
-        "voltage"
+    fn signals(&self) -> &'static [&'static str] {
+        &["voltage"]
+    }
+
+    fn quantity(&self) -> SignalQuantity {
+        SignalQuantity::Voltage
     }
 
     fn is_commanded(&self) -> bool {
@@ -54,7 +58,7 @@ impl ActuatorKindEntry for VoltageDrive {
         }
     }
 
-    fn terms(&self, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
+    fn terms(&self, _: usize, gain: &dyn Fn(&str) -> Option<ActuatorGain>) -> Vec<ActuatorTerm> {
         motor_terms(gain)
     }
 }

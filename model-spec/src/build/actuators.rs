@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::actuators::{ActuatorGain, ActuatorKind, GainEntry, ModelActuator};
+use crate::actuators::{ActuatorGain, ActuatorKind, GainEntry, ModelActuator, SignalQuantity};
 use crate::build::actuation::DriveRows;
 use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
@@ -39,7 +39,7 @@ pub(super) fn actuators(
             );
             continue;
         }
-        actuators.extend(actuator(entry, drive, symbols, drives, log));
+        actuators.extend(read_actuator(entry, drive, symbols, drives, log));
     }
     check_signals(model, &actuators, symbols, drives, log);
     actuators
@@ -65,15 +65,17 @@ fn find_drive(entry: &ActuatorEntry, drives: &DriveRows, log: &mut DiagnosticLog
     found.map(DriveIdx)
 }
 
-/// Reads one actuator; `None` after a fault, which is reported.
-fn actuator(
+/// Reads one actuator, with one entry for each of its signals; none after a fault, which is reported.
+fn read_actuator(
     entry: &ActuatorEntry,
     drive: DriveIdx,
     symbols: &SymbolTable,
     drives: &DriveRows,
     log: &mut DiagnosticLog,
-) -> Option<ModelActuator> {
-    let kind = entry.kind?;
+) -> Vec<ModelActuator> {
+    let Some(kind) = entry.kind else {
+        return Vec::new();
+    };
     let before = log.n_errors();
     let row = &drives.rows[drive.0];
     let load = row.kind.place_load(&symbols.coordinates);
@@ -136,31 +138,75 @@ fn actuator(
     if let Some(number) = entry.delay.as_ref().filter(|number| number.value < 0.0) {
         log.push(Diagnostic::error(number.span, "this delay is negative").label("expected seconds, 0 or more"));
     }
-    let [saturation, dead_band] = limits(entry, kind, log);
+    let [saturation, dead_band, rate_limit] = limits(entry, kind, log);
+    let signals = kind.signals();
+    if let Some(name) = entry.signal.as_ref().filter(|_| signals.len() > 1) {
+        let names: Vec<String> = signals
+            .iter()
+            .map(|signal| format!("`{}_{signal}`", row.name))
+            .collect();
+        log.push(
+            Diagnostic::error(name.span, format!("`{}` has {} signals", kind.name(), signals.len()))
+                .label("one name is not enough")
+                .help(format!(
+                    "delete it, and name the columns of {} in [recording.columns]",
+                    names.join(" and ")
+                )),
+        );
+    }
+    if log.n_errors() > before {
+        return Vec::new();
+    }
+    let quantity = kind.entry().quantity();
     let motion = match row.kind {
-        DriveKind::Joint(i) if kind.entry().is_position() => symbols.coordinates[i.0].motion,
+        DriveKind::Joint(i) if quantity == SignalQuantity::Position => symbols.coordinates[i.0].motion,
         _ => CoordinateMotion::Prismatic,
     };
-    let signal = entry.signal.as_ref();
-    (log.n_errors() == before).then(|| ModelActuator {
+    let own_name = entry.signal.as_ref();
+    let each = signals.iter().enumerate().map(|(at, signal)| ModelActuator {
         drive,
         kind,
-        signal: signal.map_or_else(|| format!("{}_{}", row.name, kind.signal()), |name| name.text.clone()),
+        signal: own_name.map_or_else(|| format!("{}_{signal}", row.name), |name| name.text.clone()),
         motion,
-        terms: kind.entry().terms(&|key| gains.get(key).cloned()),
-        delay,
+        quantity,
+        terms: kind.entry().terms(at, &|key| gains.get(key).cloned()),
+        delay: delay.or(kind.entry().usual_delay()),
         saturation,
         dead_band,
-    })
+        rate_limit,
+    });
+    // A signal that makes no force is not recorded.
+    each.filter(|one| !one.terms.is_empty()).collect()
 }
 
-/// The saturation and the dead band of an actuator; faults are reported.
-fn limits(entry: &ActuatorEntry, kind: ActuatorKind, log: &mut DiagnosticLog) -> [Option<f64>; 2] {
+/// The saturation, the dead band and the limit of the rate of an actuator; faults are reported.
+fn limits(entry: &ActuatorEntry, kind: ActuatorKind, log: &mut DiagnosticLog) -> [Option<f64>; 3] {
+    if let Some(number) = entry.saturation.as_ref().filter(|_| kind.signals().len() > 1) {
+        log.push(
+            Diagnostic::error(number.span, format!("`{}` has no `saturation`", kind.name()))
+                .label("its pressures are measured, so that limits of the supply are in them")
+                .help("delete it"),
+        );
+    }
+    if let Some(number) = &entry.rate_limit {
+        if !kind.is_commanded() {
+            log.push(
+                Diagnostic::error(number.span, format!("`{}` has no `rate_limit`", kind.name()))
+                    .label("a limit of the rate belongs to a command")
+                    .help("delete it"),
+            );
+        } else if number.value <= 0.0 {
+            log.push(
+                Diagnostic::error(number.span, "this limit of the rate is not positive")
+                    .label("expected a rate above 0"),
+            );
+        }
+    }
     if let Some(number) = entry.saturation.as_ref().filter(|number| number.value <= 0.0) {
         log.push(Diagnostic::error(number.span, "this saturation is not positive").label("expected a force above 0"));
     }
     if let Some(number) = &entry.dead_band {
-        if !kind.entry().is_position() {
+        if kind.entry().quantity() != SignalQuantity::Position {
             log.push(
                 Diagnostic::error(number.span, format!("`{}` has no `dead_band`", kind.name()))
                     .label("a dead band belongs to the error of a position")
@@ -170,7 +216,7 @@ fn limits(entry: &ActuatorEntry, kind: ActuatorKind, log: &mut DiagnosticLog) ->
             log.push(Diagnostic::error(number.span, "this dead band is negative").label("expected 0 or more"));
         }
     }
-    [&entry.saturation, &entry.dead_band].map(|number| number.as_ref().map(|number| number.value))
+    [&entry.saturation, &entry.dead_band, &entry.rate_limit].map(|number| number.as_ref().map(|number| number.value))
 }
 
 /// Reports signals with the name of another column, which would be read from the same place of a recording.

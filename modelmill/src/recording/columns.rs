@@ -366,7 +366,9 @@ fn quantity_of(known: &[(String, ColumnQuantity)], ours: &str) -> Option<ColumnQ
 fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
     match quantity {
         ColumnQuantity::Time | ColumnQuantity::Number => false,
-        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0 && ours.contains("_d"),
+        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => {
+            order > 0 && (ours.ends_with("_d") || ours.ends_with("_dd"))
+        }
         _ => true,
     }
 }

@@ -142,7 +142,12 @@ fn model_signal(
         ColumnQuantity::Angle(1) | ColumnQuantity::Length(1) => SignalRole::Rate,
         ColumnQuantity::Angle(_) | ColumnQuantity::Length(_) => SignalRole::Acceleration,
         ColumnQuantity::Force | ColumnQuantity::Torque => SignalRole::Force,
-        ColumnQuantity::ForceVariance | ColumnQuantity::TorqueVariance | ColumnQuantity::Number => return None,
+        ColumnQuantity::ForceVariance
+        | ColumnQuantity::TorqueVariance
+        | ColumnQuantity::Number
+        | ColumnQuantity::Current
+        | ColumnQuantity::Voltage
+        | ColumnQuantity::Pressure => return None,
     };
     let of_coordinate = match role {
         SignalRole::Rate => name.strip_suffix("_d"),

@@ -20,6 +20,7 @@ mod options;
 mod prepared;
 mod proposal;
 mod raised_cutoff;
+mod rate_limit;
 mod read;
 mod sensor_faults;
 mod shared_drives;

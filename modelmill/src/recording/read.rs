@@ -12,7 +12,7 @@ use super::columns::read_options;
 use super::free;
 use super::leverage::DriveLeverage;
 use super::options::RecordingOptions;
-use super::{shared_drives, table_range};
+use super::{rate_limit, shared_drives, table_range};
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
@@ -153,6 +153,9 @@ pub(super) fn read_raw(model: &Model, file: &RecordingFiles, reading: &Recording
     // Turns are added before anything is compared with its neighbours.
     raw.unwrap_angles(&model.active_coordinate_types());
     // These notes concern the result, so that they stay with the recording.
+    for note in rate_limit::limit_commands(&model.derivation.mechanism, &mut raw)? {
+        raw.add_note(note);
+    }
     if let Some(note) = shared_drives::add_projected_forces(model, &mut raw)? {
         raw.add_note(note);
     }

@@ -509,7 +509,10 @@ type GainColumn = fn(f64, f64, f64) -> f64;
 /// An actuator of a test: its entry, and its columns at a position, a rate and a signal, one for each gain. Written
 /// without the library of kinds.
 fn test_actuator(kind: usize, drive: &str, name: &str) -> (String, Vec<GainColumn>) {
-    let head = format!("[[actuator]]\ndrive = \"{drive}\"\nsignal = \"{name}_signal\"\ndelay = 0\n");
+    let mut head = format!("[[actuator]]\ndrive = \"{drive}\"\ndelay = 0\n");
+    if kind != 5 {
+        head += &format!("signal = \"{name}_signal\"\n");
+    }
     let (entry, columns): (String, Vec<GainColumn>) = match kind {
         0 => (
             format!("kind = \"position_servo\"\nkp = \"{name}_a\"\nkd = \"{name}_b\"\n"),
@@ -529,6 +532,10 @@ fn test_actuator(kind: usize, drive: &str, name: &str) -> (String, Vec<GainColum
             ),
             vec![|_, _, s| 1.5 * s, |_, v, _| -4.5 * v],
         ),
+        5 => (
+            format!("kind = \"hydraulic_cylinder\"\narea_a = \"{name}_a\"\n"),
+            vec![|_, _, s| s],
+        ),
         _ => (
             format!("kind = \"duty\"\ntorque_constant = \"{name}_a\"\nresistance = 2\nsupply = 12\n"),
             vec![|_, _, s| 6.0 * s],
@@ -544,6 +551,8 @@ fn units(kind: usize, force: &str) -> [&'static str; 2] {
         (0, _) => ["N m", "N m s"],
         (1, "N") => ["N s/m", "1"],
         (1, _) => ["N m s", "1"],
+        (5, "N") => ["m^2", "1"],
+        (5, _) => ["m^3", "1"],
         (_, "N") => ["N/A", "V s/m"],
         _ => ["N m/A", "V s"],
     }
@@ -586,11 +595,11 @@ fn base_parameters_with_gains_agree_with_independent_ranks() {
     for (m, name) in names.iter().enumerate() {
         let file = format!("{folder}/{name}.toml");
         let bare = Model::open(&file).unwrap();
-        for offset in 0..5 {
+        for offset in 0..6 {
             let (mut parameters, mut entries, mut columns) =
                 (vec!["[parameters]\n".to_owned()], String::new(), Vec::new());
             for (d, drive) in bare.row_names().iter().enumerate() {
-                let kind = (d + offset + m) % 5;
+                let kind = (d + offset + m) % 6;
                 let (entry, its) = test_actuator(kind, drive, &format!("gain{d}"));
                 let [a, b] = units(kind, bare.force_unit(d));
                 parameters.push(format!("gain{d}_a = {{ unit = \"{a}\" }}\n"));
@@ -715,6 +724,122 @@ fn jumps_of_a_current_are_kept() {
             "{expression}: {value} +- {std}, {truth}"
         );
     }
+}
+
+/// A cylinder with the pressures of both chambers: mass, friction and the area of the rod side from a known piston area.
+#[test]
+fn a_cylinder_is_identified_from_two_pressures() {
+    let text = r#"
+schema = 1
+name = "cylinder"
+[parameters]
+M = { unit = "kg" }
+rod_side = { unit = "m^2" }
+[coordinates]
+x = { nominal = 0 }
+[[frame]]
+name = "slide"
+on = "base"
+joint = { prismatic = "x", axis = "x" }
+[[part]]
+on = "slide"
+mass = "M"
+[[drive]]
+name = "jack"
+joint = "x"
+[[effect]]
+kind = "viscous_friction"
+at = "jack"
+[[actuator]]
+drive = "jack"
+kind = "hydraulic_cylinder"
+area_a = 2e-3
+area_b = "rod_side"
+[recording.columns]
+jack_pressure_a = "pa [bar]"
+jack_pressure_b = "pb [bar]"
+"#;
+    let servo = servo(text);
+    assert!(servo.scale.freedoms.is_empty(), "{:?}", servo.scale);
+    let (mass, viscous, area) = (250.0, 900.0, 1.2e-3);
+    let mut log: [Vec<f64>; 4] = Default::default();
+    let (w1, w2) = (3.1, 7.3);
+    for k in 0..3000 {
+        let t = 0.005 * f64::from(k);
+        let x = 0.2 * (w1 * t).sin() + 0.05 * (w2 * t).sin();
+        let v = 0.2 * w1 * (w1 * t).cos() + 0.05 * w2 * (w2 * t).cos();
+        let a = -0.2 * w1 * w1 * (w1 * t).sin() - 0.05 * w2 * w2 * (w2 * t).sin();
+        let back = 6e5 + 2e5 * (1.7 * t).sin();
+        let front = (mass * a + viscous * v + area * back) / 2e-3;
+        for (column, value) in log.iter_mut().zip([t, x, front / 1e5, back / 1e5]) {
+            column.push(value);
+        }
+    }
+    let names = ["t", "x", "pa", "pb"].map(str::to_owned);
+    let found = identify(&servo, names.into_iter().zip(log).collect());
+    for (expression, truth) in [("M", mass), ("rod_side", area), ("Fv_jack", viscous)] {
+        let (value, _) = value(&found, expression);
+        assert!((value / truth - 1.0).abs() < 2e-3, "{expression}: {value}, {truth}");
+    }
+    assert!(
+        found.delays.is_empty() || found.delays.iter().all(|delay| delay.value == 0.0),
+        "{:?}",
+        found.delays
+    );
+    // Two signals have no common name, and their pressures contain all limits.
+    for line in ["signal = \"p\"", "saturation = 5"] {
+        let text = text.replace("area_a = 2e-3", &format!("area_a = 2e-3\n{line}"));
+        let error = Model::from_text("cylinder.toml", &text)
+            .err()
+            .expect("an error")
+            .to_string();
+        assert!(error.contains("hydraulic_cylinder"), "{error}");
+    }
+}
+
+/// A command beyond the rate that the servo follows: gains are those of the servo if the file states the limit, and wrong
+/// otherwise.
+#[test]
+fn a_limited_rate_of_the_command_is_taken_into_account() {
+    let (j, ml, kp, kd, limit) = (0.02, 0.15, 6.0, 0.25, 1.5);
+    let (mut q, mut v, mut reached) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut log: [Vec<f64>; 3] = Default::default();
+    let (step, inner) = (0.005, 50);
+    let h = step / f64::from(inner);
+    for k in 0..4000 {
+        let t = f64::from(k) * step;
+        // Steps between poses, as of a teach-in program.
+        let wanted = 0.5 * (0.9 * t).sin().signum() + 0.3 * (2.3 * t).sin();
+        if k > 0 {
+            reached += (wanted - reached).clamp(-limit * step, limit * step);
+        } else {
+            reached = wanted;
+        }
+        for (column, value) in log.iter_mut().zip([t, q, wanted]) {
+            column.push(value);
+        }
+        for _ in 0..inner {
+            let torque = kp * (reached - q) - kd * v;
+            v += h * (torque - ml * 9.81 * q.sin()) / j;
+            q += h * v;
+        }
+    }
+    let names = ["t", "q", "motor_command"].map(str::to_owned);
+    let text = pendulum(&[("ml", ml)]);
+    let limited = text.replace(
+        "kind = \"position_servo\"",
+        &format!("kind = \"position_servo\"\nrate_limit = {limit}"),
+    );
+    let error = |text: &str| {
+        let found = identify(&servo(text), names.clone().into_iter().zip(log.clone()).collect());
+        let (value, _) = value(&found, "kp");
+        (value / kp - 1.0).abs()
+    };
+    let [with, without] = [error(&limited), error(&text)];
+    assert!(
+        with < 0.02 && without > 5.0 * with,
+        "{with}, without the limit {without}"
+    );
 }
 
 /// A feed-forward torque adds to a servo, and fixes its scale.

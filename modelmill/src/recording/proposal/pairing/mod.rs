@@ -656,8 +656,12 @@ fn model_columns(mechanism: &Mechanism) -> Vec<ModelColumn> {
             ColumnQuantity::Angle(1) | ColumnQuantity::Length(1) => SignalRole::Rate,
             ColumnQuantity::Angle(_) | ColumnQuantity::Length(_) => SignalRole::Acceleration,
             ColumnQuantity::Force | ColumnQuantity::Torque => SignalRole::Force,
-            // Variances are never guessed.
-            ColumnQuantity::ForceVariance | ColumnQuantity::TorqueVariance => return None,
+            // Variances and signals of actuators are never guessed.
+            ColumnQuantity::ForceVariance
+            | ColumnQuantity::TorqueVariance
+            | ColumnQuantity::Current
+            | ColumnQuantity::Voltage
+            | ColumnQuantity::Pressure => return None,
         };
         let mut names = vec![name.clone()];
         if matches!(role, SignalRole::Rate | SignalRole::Acceleration) {
