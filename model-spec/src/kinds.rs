@@ -208,8 +208,8 @@ pub struct KindParameter {
     pub symbol: String,
     /// The sign that it must have.
     pub sign: Sign,
-    /// Its unit, by the quantity that the effect adds at a place (force, torque, mass, other). Only quantities of places
-    /// where the effect may act are included.
+    /// Its unit for each quantity that the effect may add (force, torque, mass, other), as pairs. A quantity is listed only if
+    /// the effect may act at a place that has it.
     pub units: Vec<(PlaceLoad, String)>,
     /// Remark; may be empty.
     pub note: String,
@@ -222,7 +222,7 @@ pub struct KindConstant {
     pub symbol: String,
     /// Default value as text; `None` if the effect must give one.
     pub value: Option<String>,
-    /// Its unit, by the quantity that the effect adds at a place.
+    /// Its unit for each quantity that the effect may add, as pairs.
     pub units: Vec<(PlaceLoad, String)>,
     /// How it is found if it is unknown; `None` if it must be known.
     pub search: Option<ConstantSearch>,

@@ -26,8 +26,8 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! // Each regressor column belongs to one product of parameters. Of linearly dependent columns one is kept; `retained` is
-//! // the product of the kept column.
+//! // Each regressor column belongs to one product of parameters. As many columns as are linearly independent are kept;
+//! // `retained` is the product of a kept column.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
@@ -66,7 +66,7 @@
 //! | [`Model::compare`] | error figures (such as the NRMS), and the ranges of coordinates, rates, loads and time in which errors are large |
 //! | [`Model::simulate_motion`], [`Model::compare_forward`] | the motion under recorded forces, and its position errors in simulations of 0.1 s, 1 s and the whole run |
 //! | [`Model::diagnose`] | the physical effects that are missing |
-//! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects with the results pass, fail, not evaluated |
+//! | [`Model::verify`] | a test of the model: checks of drives, parameters and effects, each with the result `pass`, `fail` or `not evaluated` |
 //! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
 //! | [`Host::simulate`] | simulation of a rig (a numeric model of the complete machine, used in place of hardware) along a trajectory |
@@ -112,7 +112,7 @@
 //! let fit = model.recording("../recordings/spidermill-mbs/plain-fit.csv", &reading)?;
 //! let check = model.recording("../recordings/spidermill-mbs/plain-check.csv", &reading)?;
 //!
-//! let compared = model.compare(&[&check], &model.nominal)?;
+//! let compared = model.compare(&[&check], &model.values)?;
 //! let identified = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
 //! let after = identified.fit.check.as_ref().and_then(|figures| figures.nrms);
 //! assert!(after < compared.figures.nrms);

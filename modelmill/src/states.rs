@@ -184,7 +184,7 @@ impl ModelFunctions {
     /// let zero = StateMatrix { numbers: &[0.0, 0.0], width: 2, by_state: true };
     /// let states = StateSamples { q: zero, qd: Some(zero), qdd: Some(zero), forces: None };
     /// let functions = arm.functions();
-    /// let forces = functions.evaluate_at(ModelFunction::InverseDynamics, &states, &arm.nominal)?;
+    /// let forces = functions.evaluate_at(ModelFunction::InverseDynamics, &states, &arm.values)?;
     /// assert!(forces.len() == 2 && forces[0] > forces[1]);
     /// # Ok::<(), modelmill::Error>(())
     /// ```

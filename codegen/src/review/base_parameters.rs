@@ -258,7 +258,7 @@ pub(super) fn base_parameters(page: &mut PageDocument, derivation: &Derivation, 
             "; this geometry is special, and some base parameters are indistinguishable"
         };
         line.push(text(format!(
-            " Numeric check of eq. (9) with the file's values at {} random states: rank {}{verdict}.",
+            " Numeric check of the number of base parameters: H at {} random states, with the file's values, has rank {}{verdict}.",
             n.samples, n.rank
         )));
         if let Some(condition) = n.condition {

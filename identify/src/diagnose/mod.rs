@@ -112,9 +112,9 @@ pub enum DiagnosisVerdict {
     Adequate,
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
-    /// A part of the residual remains that no candidate explains: it is repeatable, or it follows the time. Also if the
-    /// recordings are explained only after the correction of a fault, or if noise of half the force or more hides what may
-    /// be missing.
+    /// A part of the residual remains that no candidate explains: it is repeatable, or it varies with time. The verdict is
+    /// the same if the recordings agree with the model only after the correction of a fault, or if noise of half the force
+    /// or more hides what may be missing.
     Unexplained,
 }
 
@@ -216,7 +216,7 @@ pub struct ModelDiagnosis {
     pub repeatable_share: Vec<f64>,
     /// Indices of the channels whose residual is unexplained.
     pub unexplained: Vec<usize>,
-    /// Residuals that follow the time and not the state, and that cannot be noise.
+    /// Residuals that vary with time, are not a function of the state, and cannot be noise.
     pub time_residuals: Vec<TimeResidual>,
     /// Places on which proposed laws may act; empty unless something is unexplained.
     pub sites: Vec<LawSite>,

@@ -271,11 +271,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
-        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing of what the effects found leave",
+        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing of the remaining error",
         RejectionReason::ExplainsNothing => "explains almost none of the error",
-        RejectionReason::OnlyNoiseRemains if has_findings => {
-            "not needed: it would only fit the noise or rounding that the effects found leave"
-        }
+        RejectionReason::OnlyNoiseRemains if has_findings => "not needed: it would only fit noise or rounding",
         RejectionReason::OnlyNoiseRemains => "the residual is only noise or rounding",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
         RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",

@@ -107,7 +107,8 @@ impl Host {
         self
     }
 
-    /// The host whose listener receives jobs and no notes, for a model whose notes would repeat those of another one.
+    /// The host with a listener that receives no notes, only jobs. Use it for a second model if its notes would repeat those
+    /// of the first one.
     #[must_use]
     pub fn without_notes(mut self) -> Self {
         self.progress = Arc::new(ProgressWithoutNotes(self.progress));

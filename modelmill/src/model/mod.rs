@@ -60,9 +60,9 @@ pub struct Model {
     pub values: Vec<f64>,
     /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
     pub notes: Vec<RecordingNote>,
-    /// Covariance of the values in `nominal`, if they come from a fit that has one.
+    /// Covariance of the values in `values`, if they come from a fit that has one.
     covariance: Option<Arc<DMatrix<f64>>>,
-    /// Whether each value in `nominal` was identified, in the file or in a fit.
+    /// Whether each of `values` was identified, in the file or in a fit.
     identified: Vec<bool>,
     /// The sign that each dynamic parameter must have, in the order of the mechanism.
     signs: Vec<Sign>,
@@ -82,7 +82,7 @@ impl Model {
     /// use modelmill::Model;
     ///
     /// let arm = Model::open("../model-spec/models/two_link.toml")?;
-    /// assert_eq!(arm.drives(), ["joint1", "joint2"]);
+    /// assert_eq!(arm.row_names(), ["joint1", "joint2"]);
     /// # Ok::<(), modelmill::Error>(())
     /// ```
     pub fn open(path: impl AsRef<Path>) -> Outcome<Self> {
@@ -383,7 +383,7 @@ impl Model {
     }
 
     /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
-    /// an effect. Of several linearly dependent regressor columns, one is kept; the retained product is its product.
+    /// an effect. The retained product is that of its regressor column, which is kept.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;
@@ -495,8 +495,8 @@ impl Model {
     /// use modelmill::Model;
     ///
     /// let arm = Model::open("../model-spec/models/two_link.toml")?;
-    /// let values: Vec<f64> = arm.nominal.iter().map(|value| 1.1 * value).collect();
-    /// assert_eq!(arm.with_values(&values).nominal, values);
+    /// let values: Vec<f64> = arm.values.iter().map(|value| 1.1 * value).collect();
+    /// assert_eq!(arm.with_values(&values).values, values);
     /// # Ok::<(), modelmill::Error>(())
     /// ```
     #[must_use]
@@ -512,9 +512,8 @@ impl Model {
 
     /// The model with the values of a fit, see [`Model::values_of`].
     ///
-    /// The covariance of the fit has an effect only on a diagnosis with
-    /// [`FixedParameters::All`](crate::diagnose::FixedParameters::All). With a covariance, [`Model::diagnose`] uses the
-    /// values and the covariance as a prior. Without one, it fixes the parameters exactly at the values.
+    /// In a diagnosis with [`FixedParameters::All`](crate::diagnose::FixedParameters::All), a fit with a covariance is used
+    /// as a prior; without one, the parameters are fixed at its values. Nothing else uses the covariance.
     #[must_use]
     pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {
@@ -560,8 +559,8 @@ impl Model {
         self.identified[k]
     }
 
-    /// Whether a base parameter has a nominal value: it was identified, or the file gives values for all factors of at
-    /// least one of its products. These values may be zero.
+    /// Whether the model has a value for a base parameter: an identified one, or a nominal one because the file gives values
+    /// for all factors of at least one of its products. Zero counts as a value.
     pub fn has_values(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;

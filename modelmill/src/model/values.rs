@@ -18,7 +18,8 @@ pub struct BaseParameterValues {
 }
 
 impl Model {
-    /// The nominal values. Base parameters for which the file gives none are 0, which a note states.
+    /// The values of the model: [`Model::values`] with their covariance. Base parameters for which the file gives none are 0,
+    /// which a note states.
     pub fn nominal_values(&self) -> BaseParameterValues {
         let without: Vec<&str> = (0..self.base.len())
             .filter(|k| !self.has_values(*k))

@@ -40,7 +40,7 @@ pub trait StepWording: RemedyWording {
     fn format_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 }
 
-/// Plain words for a caller of the Rust library `modelmill`; the name does not refer to a library of effects.
+/// Plain words for a caller of the Rust library `modelmill`.
 impl StepWording for RustWording {
     fn format_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut says = format!("{}: add {} at {}", model.name, effect.kind, effect.at.join(", "));

@@ -348,7 +348,7 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
 /// Table of all candidates with an explanation of its columns.
 fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p>The table lists every kind of effect and disturbance at every place (drive, joint, point, body) where it can act. \
+        "<p>The table lists the candidates that were tried: kinds of effects and disturbances at the places where they can act (drive, joint, point, body, constant, base, or `force` for all force signals). \
          <i>squared error explained if added alone</i>: the share of the squared error of the given model that the candidate \
          removes without any other effect. <i>gain in addition to the effects found</i>: the share of the squared residual that \
          the candidate removes if it is added to the model with these effects. For an effect that was found, all other effects found are added \
@@ -370,8 +370,8 @@ fn parameters(findings: &DiagnosisFindings) -> String {
                 "<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive \
                  are divided by the standard deviation of its residual. The standard deviations in this section are computed \
                  from the residual alone, and allow for its correlation in time. The section of missing effects also uses the \
-                 upper bound of the noise, so its standard deviations may differ. With little noise the standard deviations are small, so a \
-                 difference of many of them may still be far too small to matter.</p>\n",
+                 upper bound of the noise, so its standard deviations may differ. With little noise, an estimate may differ from \
+                 its nominal value by many standard deviations although the difference is too small to matter.</p>\n",
             );
             html.push_str(&tables::parameters(after));
             let _ = writeln!(

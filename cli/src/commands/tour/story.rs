@@ -77,8 +77,8 @@ impl TourText {
             "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
              model file has {} (two cranks and two couplers), {} and {}. The elbows and the platform are point masses. The screws \
              are the drives spindle_left and spindle_right. The angles of the cranks are theta1 and theta2; those of the couplers, \
-             relative to the cranks, are gamma1 and gamma2. The lengths d1 and d3 are known; masses, centres of mass (dc1, dc3) and \
-             inertias are unknown. The forces of the screws are linear in {} of unknown parameters, such as m1*dc1. Many of these \
+             relative to the cranks, are gamma1 and gamma2. The lengths of crank (d1) and coupler (d3) are known; masses, inertias and the distances of the \
+             centres of mass (dc1, dc3) are unknown. The forces of the screws are linear in {} of unknown parameters, such as m1*dc1. Many of these \
              products always act together. Measurements can determine only {} combinations of them, the \
              base parameters. modelmill finds these symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
@@ -211,8 +211,8 @@ impl TourText {
         };
         self.paragraph(&format!(
             "A few lines in the model file describe the effect. They give the estimates of its parameters as nominal values. Jr \
-             and Sr are the moment of inertia and the first moment of mass of a rod about its pivot. Both screws have the same \
-             values. Comments and layout of the file do not change. The tour writes the result to {}, as the command below does:",
+             and Sr are the moment of inertia and the first moment of mass of a rod about its pivot. One pair of values holds \
+             for both screws, because the effect names both drives. Comments and layout of the file do not change. The tour writes the result to {}, as the command below does:",
             place.name(EDITED)
         ));
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
@@ -289,7 +289,8 @@ impl TourText {
         self.line("");
         self.paragraph(&format!(
             "Error on the validation run, relative to the force (nrms), on a logarithmic scale. The last line ({}) is \
-             computed from all recordings together.",
+             the error of a fit to both recordings together. The lines above are from a fit to the first recording alone, so their \
+             error on the validation run is larger.",
             words::floor_label(noise)
         ));
     }
@@ -302,7 +303,7 @@ impl TourText {
              Each coupler carries half of the platform's mass m4 as a point mass, but the equations of the paper use two different \
              points for it. In the balance of forces it is at the end of the coupler (R3m or R3m_right). In the balance of moments it is at the \
              coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines this cause and those of the paper. The \
-             recording is a simulation of the same robot whose screws have no mass. The base parameters are fixed at their nominal values \
+             recordings are other simulations of this robot, with massless screws. The base parameters are fixed at their nominal values \
              (`--held`), as in step 2:",
         );
         self.paragraph(&verdict(findings));
