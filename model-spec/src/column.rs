@@ -113,7 +113,7 @@ pub(crate) fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] 
             ("mbar", 1e2),
             ("kPa", 1e3),
             ("MPa", 1e6),
-            ("psi", 6894.757_293_168),
+            ("psi", 6_894.757_293_168),
         ],
         ColumnQuantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
         ColumnQuantity::Angle(1) => &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", TURN / 60.0), ("rev/s", TURN)],

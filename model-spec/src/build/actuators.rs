@@ -9,6 +9,7 @@ use crate::build::actuation::DriveRows;
 use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::joint_motion::CoordinateMotion;
+use crate::kinds::PlaceLoad;
 use crate::mechanism::{DriveIdx, DriveKind};
 use crate::schema::{ActuatorEntry, ModelEntry};
 use crate::scope::{FormulaRequirement, SymbolSort};
@@ -78,62 +79,7 @@ fn read_actuator(
     };
     let before = log.n_errors();
     let row = &drives.rows[drive.0];
-    let load = row.kind.place_load(&symbols.coordinates);
-    let known = kind.entry().gains();
-    // A gain of another kind would be ignored without a word.
-    for key in GainEntry::KEYS {
-        if let Some(formula) = GainEntry::formula(key, entry)
-            && !known.iter().any(|one| one.key == key)
-        {
-            let keys: Vec<&str> = known.iter().map(|one| one.key).collect();
-            log.push(
-                Diagnostic::error(formula.ast.span, format!("`{}` has no `{key}`", kind.name()))
-                    .label(format!("expected one of {}", keys.join(", ")))
-                    .help(format!("its force is {}", kind.formula())),
-            );
-        }
-    }
-    let mut gains: BTreeMap<&str, ActuatorGain> = BTreeMap::new();
-    for one in known {
-        let Some(formula) = GainEntry::formula(one.key, entry) else {
-            if one.is_required && !entry.faulty {
-                log.push(
-                    Diagnostic::error(entry.span, format!("`{}` needs `{}`", kind.name(), one.key))
-                        .label(format!("its force is {}", kind.formula()))
-                        .help(if one.may_be_unknown {
-                            "give a number if it is known, otherwise the name of a parameter of [parameters]"
-                        } else {
-                            "give a number or a constant; where it is unknown, give 1: the other gains then include it"
-                        }),
-                );
-            }
-            continue;
-        };
-        let sorts: &[SymbolSort] = if one.may_be_unknown {
-            &[SymbolSort::Constant, SymbolSort::Parameter]
-        } else {
-            &[SymbolSort::Constant]
-        };
-        let what = format!("`{}`", one.key);
-        let wanted = FormulaRequirement {
-            sorts,
-            dimension: one.dimension(load),
-            what: &what,
-        };
-        let Some(exact) = symbols.scope.resolve(&formula, wanted, log) else {
-            continue;
-        };
-        match ActuatorGain::from_expression(&exact) {
-            Some(gain) => {
-                gains.insert(one.key, gain);
-            }
-            None => log.push(
-                Diagnostic::error(formula.ast.span, format!("`{}` is no product", one.key))
-                    .label("expected a number, an expression in constants, or a parameter times such")
-                    .help("declare one parameter for the complete gain"),
-            ),
-        }
-    }
+    let gains = read_gains(entry, kind, row.kind.place_load(&symbols.coordinates), symbols, log);
     let delay = entry.delay.as_ref().map(|number| number.value);
     if let Some(number) = entry.delay.as_ref().filter(|number| number.value < 0.0) {
         log.push(Diagnostic::error(number.span, "this delay is negative").label("expected seconds, 0 or more"));
@@ -177,6 +123,72 @@ fn read_actuator(
     });
     // A signal that makes no force is not recorded.
     each.filter(|one| !one.terms.is_empty()).collect()
+}
+
+/// The gains of an actuator by their keys; faults are reported.
+fn read_gains(
+    entry: &ActuatorEntry,
+    kind: ActuatorKind,
+    load: PlaceLoad,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> BTreeMap<&'static str, ActuatorGain> {
+    let known = kind.entry().gains();
+    // A gain of another kind would be ignored without a word.
+    for key in GainEntry::KEYS {
+        if let Some(formula) = GainEntry::formula(key, entry)
+            && !known.iter().any(|one| one.key == key)
+        {
+            let keys: Vec<&str> = known.iter().map(|one| one.key).collect();
+            log.push(
+                Diagnostic::error(formula.ast.span, format!("`{}` has no `{key}`", kind.name()))
+                    .label(format!("expected one of {}", keys.join(", ")))
+                    .help(format!("its force is {}", kind.formula())),
+            );
+        }
+    }
+    let mut gains = BTreeMap::new();
+    for one in known {
+        let Some(formula) = GainEntry::formula(one.key, entry) else {
+            if one.is_required && !entry.faulty {
+                log.push(
+                    Diagnostic::error(entry.span, format!("`{}` needs `{}`", kind.name(), one.key))
+                        .label(format!("its force is {}", kind.formula()))
+                        .help(if one.may_be_unknown {
+                            "give a number if it is known, otherwise the name of a parameter of [parameters]"
+                        } else {
+                            "give a number or a constant; where it is unknown, give 1: the other gains then include it"
+                        }),
+                );
+            }
+            continue;
+        };
+        let sorts: &[SymbolSort] = if one.may_be_unknown {
+            &[SymbolSort::Constant, SymbolSort::Parameter]
+        } else {
+            &[SymbolSort::Constant]
+        };
+        let what = format!("`{}`", one.key);
+        let wanted = FormulaRequirement {
+            sorts,
+            dimension: one.dimension(load),
+            what: &what,
+        };
+        let Some(exact) = symbols.scope.resolve(&formula, wanted, log) else {
+            continue;
+        };
+        match ActuatorGain::from_expression(&exact) {
+            Some(gain) => {
+                gains.insert(one.key, gain);
+            }
+            None => log.push(
+                Diagnostic::error(formula.ast.span, format!("`{}` is no product", one.key))
+                    .label("expected a number, an expression in constants, or a parameter times such")
+                    .help("declare one parameter for the complete gain"),
+            ),
+        }
+    }
+    gains
 }
 
 /// The saturation, the dead band and the limit of the rate of an actuator; faults are reported.

@@ -20,7 +20,11 @@ pub(super) fn limit_commands(mechanism: &Mechanism, raw: &mut Raw) -> Outcome<Ve
         };
         let command = raw.column(&actuator.signal)?.to_vec();
         let reached = limit_rate(raw.column("t")?, &command, limit);
-        let n_limited = command.iter().zip(&reached).filter(|(a, b)| a != b).count();
+        let n_limited = command
+            .iter()
+            .zip(&reached)
+            .filter(|(a, b)| a.to_bits() != b.to_bits())
+            .count();
         if n_limited > 0 {
             notes.push(RecordingNote::info(format!(
                 "`{}` exceeds the `rate_limit` of its actuator; at {n_limited} of {} samples it is replaced by the command that the \
