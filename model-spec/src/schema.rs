@@ -394,7 +394,7 @@ record! {
         "area_a" area_a: optional SourceFormula,
         /// Area of the opposite chamber, m^2 or m^3/rad; none if omitted.
         "area_b" area_b: optional SourceFormula,
-        /// Delay from the recorded signal to the force, s; estimated if omitted.
+        /// Delay from the recorded signal to the force, s; estimated if omitted, 0 for a `hydraulic_cylinder`.
         "delay" delay: optional SpannedNumber,
         /// Largest absolute force of the actuator, N m or N; none if omitted.
         "saturation" saturation: optional SpannedNumber,

@@ -36,7 +36,7 @@ pub(super) fn actuators(
                 Diagnostic::error(span, "this drive has two actuators of one kind")
                     .label("the second one")
                     .related(first, "the first one")
-                    .help("put both into one actuator"),
+                    .help("put both into one actuator; for two cylinders, record the force of the drive"),
             );
             continue;
         }
@@ -193,7 +193,8 @@ fn read_gains(
 
 /// The saturation, the dead band and the limit of the rate of an actuator; faults are reported.
 fn limits(entry: &ActuatorEntry, kind: ActuatorKind, log: &mut DiagnosticLog) -> [Option<f64>; 3] {
-    if let Some(number) = entry.saturation.as_ref().filter(|_| kind.signals().len() > 1) {
+    let has_saturation = kind.signals().len() == 1;
+    if let Some(number) = entry.saturation.as_ref().filter(|_| !has_saturation) {
         log.push(
             Diagnostic::error(number.span, format!("`{}` has no `saturation`", kind.name()))
                 .label("its pressures are measured, so that limits of the supply are in them")
@@ -214,7 +215,11 @@ fn limits(entry: &ActuatorEntry, kind: ActuatorKind, log: &mut DiagnosticLog) ->
             );
         }
     }
-    if let Some(number) = entry.saturation.as_ref().filter(|number| number.value <= 0.0) {
+    if let Some(number) = entry
+        .saturation
+        .as_ref()
+        .filter(|number| has_saturation && number.value <= 0.0)
+    {
         log.push(Diagnostic::error(number.span, "this saturation is not positive").label("expected a force above 0"));
     }
     if let Some(number) = &entry.dead_band {
@@ -268,7 +273,7 @@ fn check_signals(
                 format!("`{name}` cannot name the signal of `{drive}`"),
             )
             .label("recordings have another column of this name")
-            .help("choose another `signal`, and name the column of the file in [recording.columns]"),
+            .help("choose another `signal` or another name of the drive, and name the column of the file in [recording.columns]"),
         );
     }
 }

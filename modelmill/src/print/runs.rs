@@ -272,6 +272,12 @@ pub(crate) fn verdict_text(run: &RunReport) -> Message {
         RunVerdict::Changed if run.undecided.is_empty() => Message::default(),
         RunVerdict::Changed => message!("For some drives the runs cannot show a change. {}", unknown),
         RunVerdict::Undecided => message!("The runs cannot show whether anything changed. {}", unknown),
+        RunVerdict::DifferentWithoutCause if run.moved.is_empty() => message!(
+            "The runs differ, but no {other}cause is named: each change that was found explains less than the model leaves \
+             unexplained, or is impossible, such as friction that would drive the machine. Find what the model lacks with {}, then \
+             compare the runs again.",
+            Remedy::command(CommandName::Diagnose)
+        ),
         RunVerdict::DifferentWithoutCause => message!(
             "The runs differ, but no {other}single change explains how: the base parameters below differ by more than noise and \
              model error. The model may lack an effect that depends on the motion. Find it with {}, then compare the runs again.{}",
@@ -513,6 +519,7 @@ mod tests {
                 })
                 .collect(),
             difference_factor: 1.0,
+            has_rejected_changes: false,
             changes,
         }
     }

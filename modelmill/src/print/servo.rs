@@ -48,13 +48,16 @@ impl ServoModel {
     pub fn text(&self, style: TerminalStyle) -> String {
         let model = &self.equations;
         let mut lines = vec![style.bold("Actuators, in place of measured forces")];
-        for actuator in self.actuators() {
+        // A kind with several signals has one entry for each.
+        for same in self.actuators().chunk_by(|a, b| (a.drive, a.kind) == (b.drive, b.kind)) {
+            let signals: Vec<&str> = same.iter().map(|actuator| actuator.signal.as_str()).collect();
             lines.push(format!(
-                "  {}: {} by the column {}; force = {}",
-                self.drive_name(actuator),
-                actuator.kind.name(),
-                actuator.signal,
-                actuator.kind.formula()
+                "  {}: {} by the column{} {}; force = {}",
+                self.drive_name(&same[0]),
+                same[0].kind.name(),
+                if signals.len() > 1 { "s" } else { "" },
+                signals.join(" and "),
+                same[0].kind.formula()
             ));
         }
         lines.push("  Base parameters that commands or currents can determine:".to_owned());
@@ -162,7 +165,14 @@ impl ServoIdentification {
                 .to_owned(),
         );
         lines.push(String::new());
-        lines.extend(self.delays.iter().map(|delay| format!("  {}", delay_line(delay))));
+        let mut delays: Vec<String> = self
+            .delays
+            .iter()
+            .map(|delay| format!("  {}", delay_line(delay)))
+            .collect();
+        // Signals of one actuator have the same known delay.
+        delays.dedup();
+        lines.extend(delays);
         lines.push(format!(
             "  {}",
             match &self.estimator {

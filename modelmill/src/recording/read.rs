@@ -153,7 +153,7 @@ pub(super) fn read_raw(model: &Model, file: &RecordingFiles, reading: &Recording
     // Turns are added before anything is compared with its neighbours.
     raw.unwrap_angles(&model.active_coordinate_types());
     // These notes concern the result, so that they stay with the recording.
-    for note in rate_limit::limit_commands(&model.derivation.mechanism, &mut raw)? {
+    for note in rate_limit::limit_commands(&model.derivation.mechanism, &mut raw) {
         raw.add_note(note);
     }
     if let Some(note) = shared_drives::add_projected_forces(model, &mut raw)? {

@@ -28,8 +28,8 @@ use std::borrow::Borrow;
 
 use modelmill_boundary::message;
 use modelmill_identify::changes::{
-    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, fit_blocks, search_changes, search_sensitivity,
-    within_run_spread,
+    BlockFit, ChangeHypotheses, NormalEquations, RunPair, SelectedChange, fit_blocks, search_changes,
+    search_sensitivity, within_run_spread,
 };
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use nalgebra::DVector;
@@ -96,6 +96,9 @@ pub struct RunReport {
     /// Factor on the standard deviation of a difference of parameters. It is above 1 if the model needs different
     /// parameters for different parts of one run; otherwise it is 1.
     pub difference_factor: f64,
+    /// Whether changes were found that are not reported: they explain less than the force that stays unexplained, or were
+    /// found together with an impossible change.
+    pub has_rejected_changes: bool,
     /// Changes relative to the first run, the largest first, and events within this run.
     pub changes: Vec<RunChange>,
 }
@@ -470,9 +473,7 @@ impl<'a> RunAnalyser<'a> {
 
     /// The report of a run fitted alone: values and events.
     fn run_report(&self, run: &RunStatistics) -> RunReport {
-        let base: Vec<usize> = (0..self.layout.base).collect();
-        let blocks: Vec<NormalEquations> = run.white.blocks.iter().map(|one| one.select_columns(&base)).collect();
-        let fit = fit_blocks(&blocks);
+        let fit = self.base_fit(run);
         RunReport {
             file: run.file.clone(),
             samples: run.samples,
@@ -484,6 +485,7 @@ impl<'a> RunAnalyser<'a> {
             drives: self.layout.drives,
             undecided: Vec::new(),
             difference_factor: 1.0,
+            has_rejected_changes: false,
             changes: run.events.clone(),
         }
     }
@@ -497,8 +499,10 @@ impl<'a> RunAnalyser<'a> {
             scales,
             reasons,
             difference_factor,
+            has_rejected,
         } = self.compare_pair(before, run);
         report.difference_factor = difference_factor;
+        report.has_rejected_changes = has_rejected;
         report.undecided = (self.model.row_names().into_iter().zip(&reasons))
             .filter_map(|(drive, reason)| {
                 Some(UndecidedDrive {
@@ -547,34 +551,43 @@ impl<'a> RunAnalyser<'a> {
             .iter()
             .map(|one| !one.is_some_and(verdict::UndecidedReason::spoils_fit));
         let believed: Vec<bool> = believed.collect();
-        let unexplained = |d: usize| before.unexplained.0[d].max(run.unexplained.0[d]);
         let mut found = self.significant_changes(&runs, &run.sizes, &believed);
-        self.drop_below_unexplained(&mut found, &run.sizes, unexplained);
-        if found.iter().any(|one| self.is_implausible(one, &before.values)) {
+        self.drop_unknown_friction(&mut found, |d| before.stands[d] || run.stands[d]);
+        let difference_factor = (sensitivity.min_gain / sensitivity.min_gain_of_noise).max(1.0).sqrt();
+        let n_found = found.len();
+        // Noise averages out over the samples; only an error of the model, which parts of one run show, stays.
+        if difference_factor > 1.0 {
+            let unexplained = |d: usize| before.unexplained.0[d].max(run.unexplained.0[d]);
+            self.drop_below_unexplained(&mut found, &run.sizes, &believed, unexplained);
+        }
+        if found.iter().any(|one| self.is_implausible(one, before, &believed)) {
             found.clear();
         }
-        self.drop_unknown_friction(&mut found, |d| before.stands[d] || run.stands[d]);
+        let has_rejected = found.len() < n_found;
         let scales = self.widen_loads(&mut found, [&before.white.drives, &run.white.drives]);
         PairFindings {
             found,
             scales,
-            difference_factor: (sensitivity.min_gain / sensitivity.min_gain_of_noise).max(1.0).sqrt(),
             reasons,
+            difference_factor,
+            has_rejected,
         }
     }
 
-    /// Drops changes that explain less than what stays unexplained of every drive that they act on: there an effect that the
-    /// model lacks is as likely. `unexplained` gives the share of the rms force of a drive that no parameters explain (1).
+    /// Drops changes that explain less than what stays unexplained of every drive that they act on, where this is a large
+    /// part of the force: an effect that the model lacks is as likely there. `unexplained` gives the share of the rms force of
+    /// a drive that no parameters explain (1). Drives whose force is not `believed` do not count.
     fn drop_below_unexplained(
         &self,
         found: &mut Vec<SelectedChange>,
         sizes: &MeasuredMoments,
+        believed: &[bool],
         unexplained: impl Fn(usize) -> f64,
     ) {
         found.retain(|one| {
             let columns = &self.possible[one.candidate].candidate.columns;
             let fractions = sizes.force_fractions(columns, &one.values);
-            let mut drives = fractions.iter().enumerate();
+            let mut drives = fractions.iter().enumerate().filter(|(d, _)| believed[*d]);
             drives.any(|(d, part)| {
                 let rest = unexplained(d);
                 *part > CHANGE_LEAST_FORCE_SHARE && (rest < LARGE_UNEXPLAINED_SHARE || *part > rest)
@@ -583,22 +596,36 @@ impl<'a> RunAnalyser<'a> {
     }
 
     /// Whether a change is impossible: friction would drive the machine, or the scale of a force would be negative without a
-    /// turned sign. Then the model lacks an effect, and all changes that were found with this one are doubtful. `values` are the base parameters of
-    /// the first run.
-    fn is_implausible(&self, one: &SelectedChange, values: &DVector<f64>) -> bool {
+    /// turned sign. Then the model lacks an effect, and all changes that were found with this one are dropped. Drives whose
+    /// force is not `believed`, and friction that the first run does not determine, do not count.
+    fn is_implausible(&self, one: &SelectedChange, before: &RunStatistics, believed: &[bool]) -> bool {
         let change = one.values[0];
+        let std = one.covariance[(0, 0)].max(0.0).sqrt();
         match self.possible[one.candidate].kind {
-            ChangeKind::Friction(d) => {
-                let Some(before) = changes::friction(self.model, d)[0].map(|k| values[k]) else {
+            ChangeKind::Friction(d) if believed[d] && one.determined[0] => {
+                let Some(k) = changes::friction(self.model, d)[0] else {
                     return false;
                 };
-                let std = one.covariance[(0, 0)].max(0.0).sqrt();
-                before.min(before + change) < -NEGATIVE_FRICTION_SIGMAS * std
+                let Some(std_before) = self.base_fit(before).std[k] else {
+                    return false;
+                };
+                let least = before.values[k].min(before.values[k] + change);
+                least < -NEGATIVE_FRICTION_SIGMAS * std.hypot(std_before)
             }
             // A turned sign has the factor -1.
-            ChangeKind::Scale(_) => 1.0 + change < 0.0 && (2.0 + change).abs() > TURNED_SCALE_TOLERANCE,
+            ChangeKind::Scale(d) if believed[d] => {
+                let tolerance = TURNED_SCALE_TOLERANCE.max(NEGATIVE_FRICTION_SIGMAS * std);
+                1.0 + change < 0.0 && (2.0 + change).abs() > tolerance
+            }
             _ => false,
         }
+    }
+
+    /// The base parameters fitted to a run alone.
+    fn base_fit(&self, run: &RunStatistics) -> BlockFit {
+        let base: Vec<usize> = (0..self.layout.base).collect();
+        let blocks: Vec<NormalEquations> = run.white.blocks.iter().map(|one| one.select_columns(&base)).collect();
+        fit_blocks(&blocks)
     }
 
     /// Drops changes of the friction of drives that stand: it may have any value there.
@@ -655,6 +682,8 @@ struct PairFindings {
     reasons: Vec<Option<UndecidedReason>>,
     /// As [`RunReport::difference_factor`].
     difference_factor: f64,
+    /// As [`RunReport::has_rejected_changes`].
+    has_rejected: bool,
 }
 
 /// Whether one of the values of a change is far from zero, or none is determined individually.

@@ -19,7 +19,7 @@ pub(super) const MOST_UNEXPLAINED_SHARE: f64 = 0.5;
 /// By judgement: below it, noise of real sensors is usual.
 pub(super) const LARGE_UNEXPLAINED_SHARE: f64 = 0.2;
 
-/// Dry friction is negative if it is below zero by more than this many standard deviations of its change. By judgement.
+/// Dry friction is negative, and a scale far from -1, by more than this many standard deviations. By judgement.
 pub(super) const NEGATIVE_FRICTION_SIGMAS: f64 = 2.0;
 
 /// A negative scale of a force within this distance of -1 (1) is a turned sign. By judgement.

@@ -14,7 +14,7 @@ use crate::runs::{PhysicalChange, RunReport};
 pub enum RunVerdict {
     /// At least one physical change was found.
     Changed,
-    /// Base parameters differ, but no change that is searched explains it.
+    /// The run differs, but no change that is searched explains it plausibly.
     DifferentWithoutCause,
     /// No change was found, and the forces of at least one drive would have shown one.
     Unchanged,
@@ -95,7 +95,7 @@ impl RunReport {
         if self.undecided.len() >= self.drives {
             return RunVerdict::Undecided;
         }
-        if !self.moved.is_empty() {
+        if !self.moved.is_empty() || self.has_rejected_changes {
             return RunVerdict::DifferentWithoutCause;
         }
         RunVerdict::Unchanged

@@ -433,11 +433,29 @@ impl<'a> ActuatorForces<'a> {
         if let Some(band) = actuator.dead_band {
             limits.push(format!("dead band {band} {}", actuator.position_unit()));
         }
+        if let Some(limit) = actuator.rate_limit {
+            let per = if actuator.has_position_error() { "s" } else { "s^2" };
+            limits.push(format!(
+                "rate limit {limit} {}/{per}",
+                if drive.kind.force_unit(&mechanism.coordinates) == "N" {
+                    "m"
+                } else {
+                    "rad"
+                }
+            ));
+        }
+        let signals = actuator.kind.signals();
+        let formula = if signals.len() > 1 {
+            // Each signal has a part of the force.
+            format!("part of {}", actuator.kind.formula())
+        } else {
+            actuator.kind.formula().to_owned()
+        };
         let values: Vec<String> = gains.into_iter().chain(limits).chain([delay_phrase(delay)]).collect();
         format!(
             "{} = {} of `{}`, with {}",
             drive.name,
-            actuator.kind.formula(),
+            formula,
             actuator.signal,
             values.join(", ")
         )
@@ -454,7 +472,7 @@ impl<'a> ActuatorForces<'a> {
             " They contain the noise of the encoder times the gain; wrong gains and limits of the servo appear as errors \
              of the model."
         } else {
-            " Wrong constants of the motor appear as errors of the model."
+            " Wrong constants of the actuators appear as errors of the model."
         };
         let origin = if self.gains.has_identified() {
             " Gains were identified with the effects that the model has: an effect that it lacks may be part of them."

@@ -101,7 +101,9 @@ pub(crate) fn close_loops(
         }
         // Six poses are enough to recognise a singular one.
         let is_hopeless = n_tried == NEAR_ATTEMPTS && least > FARTHEST_CLOSING_GAP;
-        if poses.len() == 6 || is_hopeless || work > WORK_LIMIT {
+        // Poses with closed loops cost little, and a singular one is recognised by several of them.
+        let is_too_long = work > WORK_LIMIT && poses.is_empty() && outside.is_empty();
+        if poses.len() == 6 || is_hopeless || is_too_long {
             break;
         }
     }
@@ -111,7 +113,7 @@ pub(crate) fn close_loops(
     }
     if poses.is_empty() {
         return Err(format!(
-            "its loops do not close: {n_tried} starting poses were tried, and gaps of at least {least:.1e} of its size remain"
+            "its loops do not close; starting poses that were tried: {n_tried}. Gaps of at least {least:.1e} of its size remain"
         ));
     }
     // The largest rank of all poses is that of a general pose; singular poses have less.
