@@ -13,8 +13,8 @@ mod model;
 mod options;
 mod results;
 mod rigs;
-mod wording;
 mod states;
+mod wording;
 mod work;
 
 use pyo3::prelude::*;
@@ -33,7 +33,7 @@ mod _core {
     #[pymodule_export]
     use crate::rigs::{PythonSimulation, reduce, simulate};
     #[pymodule_export]
-    use crate::wording::advised_names;
-    #[pymodule_export]
     use crate::states::{at_single, drive_units, forces_along, model_contents};
+    #[pymodule_export]
+    use crate::wording::advised_names;
 }
