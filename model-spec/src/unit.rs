@@ -285,7 +285,7 @@ impl schemars::JsonSchema for ModelUnit {
 /// Unit of a product of powers of quantities: `kg m` for a mass times a length.
 ///
 /// A single quantity keeps its unit as the file writes it. A text that is not a unit counts as a pure number.
-/// A single unit keeps its wording, such as `N m s/rad`.
+/// A single unit keeps its spelling, such as `N m s/rad`.
 pub fn unit_product(factors: &[(&str, i32)]) -> String {
     if let [(unit, 1)] = factors {
         return (*unit).to_owned();

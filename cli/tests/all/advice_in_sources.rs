@@ -9,7 +9,7 @@ use crate::common::workspace;
 const LIBRARIES: [&str; 4] = ["model-spec/src", "identify/src", "reduction/src", "modelmill/src"];
 
 /// The wording for callers of the library.
-const SPELLING: &str = "modelmill/src/print/wording.rs";
+const RUST_WORDING: &str = "modelmill/src/print/wording.rs";
 
 /// Rust files below a folder.
 fn sources(folder: &Path) -> Vec<PathBuf> {
@@ -30,7 +30,7 @@ fn no_library_writes_advice_by_hand() {
     let mut files = 0;
     let mut faults = Vec::new();
     for path in LIBRARIES.iter().flat_map(|folder| sources(&workspace(folder))) {
-        if path.ends_with(SPELLING) {
+        if path.ends_with(RUST_WORDING) {
             continue;
         }
         files += 1;

@@ -272,22 +272,25 @@ pub(crate) fn verdict_text(run: &RunReport) -> Message {
         RunVerdict::Changed if run.undecided.is_empty() => Message::default(),
         RunVerdict::Changed => message!("For some drives the runs cannot show a change. {}", unknown),
         RunVerdict::Undecided => message!("The runs cannot show whether anything changed. {}", unknown),
-        RunVerdict::DifferentWithoutCause if run.moved.is_empty() => message!(
-            "The runs differ, but no {other}cause is named: each change that was found explains less than the model leaves \
-             unexplained, or is impossible, such as friction that would drive the machine. Find what the model lacks with {}, then \
-             compare the runs again.",
-            Remedy::command(CommandName::Diagnose)
-        ),
-        RunVerdict::DifferentWithoutCause => message!(
-            "The runs differ, but no {other}single change explains how: the base parameters below differ by more than noise and \
-             model error. The model may lack an effect that depends on the motion. Find it with {}, then compare the runs again.{}",
-            Remedy::command(CommandName::Diagnose),
-            if run.undecided.is_empty() {
+        RunVerdict::DifferentWithoutCause => {
+            let unknown = if run.undecided.is_empty() {
                 Message::default()
             } else {
                 message!(" {}", unknown)
-            }
-        ),
+            };
+            let why = if run.moved.is_empty() {
+                "cause is named: each change that was found explains less than the force that stays unexplained, or was found \
+                 together with an impossible one, such as friction that would drive the machine. The model lacks an effect."
+            } else {
+                "single change explains how: the base parameters below differ by more than noise and model error. The model may lack \
+                 an effect that depends on the motion."
+            };
+            message!(
+                "The runs differ, but no {other}{why} Find it with {}, then compare the runs again.{}",
+                Remedy::command(CommandName::Diagnose),
+                unknown
+            )
+        }
         RunVerdict::Unchanged if run.undecided.is_empty() => {
             format!("No {other}change found that is larger than noise and model error.").into()
         }
@@ -548,6 +551,16 @@ mod tests {
                     assert_eq!(denies, !is_changed && moved == 0 && undecided < 2, "{says}");
                     let is_unknown = !is_changed && undecided == 2;
                     assert_eq!(says.contains("cannot show whether"), is_unknown, "{says}");
+                    assert_eq!(says.contains("94.0 %"), undecided > 0, "{says}");
+                    // A change that was found and rejected is not denied either.
+                    let rejected = RunReport {
+                        has_rejected_changes: true,
+                        ..one
+                    };
+                    let says = verdict_text(&rejected).format_for(&RustWording);
+                    assert!(!says.contains("change found"), "{says}");
+                    let is_named = !is_changed && moved == 0 && undecided < 2;
+                    assert_eq!(says.contains("no cause is named"), is_named, "{says}");
                     assert_eq!(says.contains("94.0 %"), undecided > 0, "{says}");
                 }
             }

@@ -80,10 +80,7 @@ pub(crate) fn read_options(
         match parse_column_sum(model, text, quantity, header) {
             Ok(sum) => mapping.add(ours, sum),
             // A recording may use the names of the model, or lack optional columns.
-            Err(ColumnFault::Missing { .. })
-                if header.contains(ours)
-                    || is_signal(model, ours)
-                    || (is_optional(ours, quantity) && !is_used_signal(model, ours)) => {}
+            Err(ColumnFault::Missing { .. }) if header.contains(ours) || is_optional(model, ours, quantity) => {}
             Err(fault) => {
                 faults.push(Error::input(message!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
@@ -364,33 +361,18 @@ fn quantity_of(known: &[(String, ColumnQuantity)], ours: &str) -> Option<ColumnQ
     found.map(|(_, quantity)| *quantity)
 }
 
-/// Derivatives, forces and variances may be missing: they are computed, or requested when they are needed.
-fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
+/// Derivatives, forces and variances may be missing: they are computed, or requested when they are needed. A recording with
+/// forces may lack signals of actuators; the equations of servos need them.
+fn is_optional(model: &Model, ours: &str, quantity: ColumnQuantity) -> bool {
+    let mechanism = &model.derivation.mechanism;
+    if mechanism.actuators.iter().any(|actuator| actuator.signal == ours) {
+        return mechanism.servo_forces.is_empty();
+    }
     match quantity {
-        ColumnQuantity::Time
-        | ColumnQuantity::Number
-        | ColumnQuantity::Current
-        | ColumnQuantity::Voltage
-        | ColumnQuantity::Pressure => false,
-        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => {
-            order > 0 && (ours.ends_with("_d") || ours.ends_with("_dd"))
-        }
+        ColumnQuantity::Time | ColumnQuantity::Number => false,
+        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0,
         _ => true,
     }
-}
-
-/// Whether a column is the signal of an actuator, which a recording with forces may lack.
-fn is_signal(model: &Model, ours: &str) -> bool {
-    let mechanism = &model.derivation.mechanism;
-    let mut actuators = mechanism.actuators.iter();
-    mechanism.servo_forces.is_empty() && actuators.any(|actuator| actuator.signal == ours)
-}
-
-/// Whether a column is the signal of an actuator in the equations of servos, which need it.
-fn is_used_signal(model: &Model, ours: &str) -> bool {
-    let mechanism = &model.derivation.mechanism;
-    let mut actuators = mechanism.actuators.iter();
-    !mechanism.servo_forces.is_empty() && actuators.any(|actuator| actuator.signal == ours)
 }
 
 /// The error of a name that is no column of the model.

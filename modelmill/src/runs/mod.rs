@@ -16,6 +16,7 @@ mod layout;
 pub(crate) mod payload;
 mod payload_scale;
 mod per_run;
+mod plausible;
 mod points;
 mod rows;
 mod standstill;
@@ -28,8 +29,7 @@ use std::borrow::Borrow;
 
 use modelmill_boundary::message;
 use modelmill_identify::changes::{
-    BlockFit, ChangeHypotheses, NormalEquations, RunPair, SelectedChange, fit_blocks, search_changes,
-    search_sensitivity, within_run_spread,
+    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, search_changes, search_sensitivity, within_run_spread,
 };
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use nalgebra::DVector;
@@ -52,10 +52,7 @@ use points::DriveDoubts;
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, UnexplainedShares, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-use thresholds::{
-    CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, LARGE_UNEXPLAINED_SHARE, NEGATIVE_FRICTION_SIGMAS,
-    PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S, TURNED_SCALE_TOLERANCE,
-};
+use thresholds::{CHANGE_LEAST_FORCE_SHARE, CHANGE_VALUE_SIGMAS, PARAMETER_CHANGE_SIGMAS, PUSH_LONGEST_GAP_S};
 use time_base::{TimeBase, correct_clock, time_scaling};
 use verdict::{RunKnowledge, undecided_reasons};
 pub use verdict::{RunVerdict, UndecidedDrive, UndecidedReason};
@@ -557,8 +554,7 @@ impl<'a> RunAnalyser<'a> {
         let n_found = found.len();
         // Noise averages out over the samples; only an error of the model, which parts of one run show, stays.
         if difference_factor > 1.0 {
-            let unexplained = |d: usize| before.unexplained.0[d].max(run.unexplained.0[d]);
-            self.drop_below_unexplained(&mut found, &run.sizes, &believed, unexplained);
+            self.drop_below_unexplained(&mut found, [before, run], &believed);
         }
         if found.iter().any(|one| self.is_implausible(one, before, &believed)) {
             found.clear();
@@ -572,60 +568,6 @@ impl<'a> RunAnalyser<'a> {
             difference_factor,
             has_rejected,
         }
-    }
-
-    /// Drops changes that explain less than what stays unexplained of every drive that they act on, where this is a large
-    /// part of the force: an effect that the model lacks is as likely there. `unexplained` gives the share of the rms force of
-    /// a drive that no parameters explain (1). Drives whose force is not `believed` do not count.
-    fn drop_below_unexplained(
-        &self,
-        found: &mut Vec<SelectedChange>,
-        sizes: &MeasuredMoments,
-        believed: &[bool],
-        unexplained: impl Fn(usize) -> f64,
-    ) {
-        found.retain(|one| {
-            let columns = &self.possible[one.candidate].candidate.columns;
-            let fractions = sizes.force_fractions(columns, &one.values);
-            let mut drives = fractions.iter().enumerate().filter(|(d, _)| believed[*d]);
-            drives.any(|(d, part)| {
-                let rest = unexplained(d);
-                *part > CHANGE_LEAST_FORCE_SHARE && (rest < LARGE_UNEXPLAINED_SHARE || *part > rest)
-            })
-        });
-    }
-
-    /// Whether a change is impossible: friction would drive the machine, or the scale of a force would be negative without a
-    /// turned sign. Then the model lacks an effect, and all changes that were found with this one are dropped. Drives whose
-    /// force is not `believed`, and friction that the first run does not determine, do not count.
-    fn is_implausible(&self, one: &SelectedChange, before: &RunStatistics, believed: &[bool]) -> bool {
-        let change = one.values[0];
-        let std = one.covariance[(0, 0)].max(0.0).sqrt();
-        match self.possible[one.candidate].kind {
-            ChangeKind::Friction(d) if believed[d] && one.determined[0] => {
-                let Some(k) = changes::friction(self.model, d)[0] else {
-                    return false;
-                };
-                let Some(std_before) = self.base_fit(before).std[k] else {
-                    return false;
-                };
-                let least = before.values[k].min(before.values[k] + change);
-                least < -NEGATIVE_FRICTION_SIGMAS * std.hypot(std_before)
-            }
-            // A turned sign has the factor -1.
-            ChangeKind::Scale(d) if believed[d] => {
-                let tolerance = TURNED_SCALE_TOLERANCE.max(NEGATIVE_FRICTION_SIGMAS * std);
-                1.0 + change < 0.0 && (2.0 + change).abs() > tolerance
-            }
-            _ => false,
-        }
-    }
-
-    /// The base parameters fitted to a run alone.
-    fn base_fit(&self, run: &RunStatistics) -> BlockFit {
-        let base: Vec<usize> = (0..self.layout.base).collect();
-        let blocks: Vec<NormalEquations> = run.white.blocks.iter().map(|one| one.select_columns(&base)).collect();
-        fit_blocks(&blocks)
     }
 
     /// Drops changes of the friction of drives that stand: it may have any value there.

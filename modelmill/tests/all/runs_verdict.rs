@@ -128,6 +128,25 @@ fn a_clock_is_found_where_rates_are_recorded() {
     }
 }
 
+/// Noise of a third of the forces is no error of the model: a load that explains less than it is named.
+#[test]
+fn a_load_below_the_noise_is_named() {
+    let model = arm_with_friction("scara", "");
+    let loaded = arm_with_friction("scara", &tool("link4", 0.5));
+    let noisy = |seed: u64| RunPlan {
+        noise: 0.4,
+        decimate: 4,
+        ..RunPlan::new(seed)
+    };
+    for seed in [500, 510] {
+        let first = noisy(seed).record(&model, &model);
+        let found = report(&model, [&first, &noisy(seed + 1).record(&model, &loaded)]);
+        let is_load = |one: &modelmill::runs::RunChange| matches!(one.change, PhysicalChange::Payload { .. });
+        assert!(found.changes.iter().any(is_load), "{seed}: {found:#?}");
+        assert!(!found.has_rejected_changes, "{seed}: {found:#?}");
+    }
+}
+
 /// Forces that the model does not explain, and drives that stand, show nothing.
 #[test]
 fn runs_that_show_nothing_are_no_proof_of_no_change() {

@@ -127,7 +127,7 @@ const IDLE_WORDS: [&str; 14] = [
     "filtered",
 ];
 
-/// Units at the end of a name behind `_`, with the wording of the tables of units. Those of one letter are units of
+/// Units at the end of a name behind `_`, with the spelling of the tables of units. Those of one letter are units of
 /// forces.
 pub(in crate::recording) const UNIT_ENDINGS: [(&str, &str); 13] = [
     ("deg", "deg"),
