@@ -125,7 +125,7 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     line.push(name("H"));
     // Pages of all mechanisms use the numbers of the paper with which the project started.
     line.push(text(
-        " belongs to one product. Equation numbers 5, 6, 9 and 16 are those of the paper Dynamic Modeling and \
+        " belongs to one product. Numbers of equations, such as (5), are those of the paper Dynamic Modeling and \
          Identification of a Complex-structured Parallel Robot, about the robot SpiderMill.",
     ));
     page.paragraph(line);

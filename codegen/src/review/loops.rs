@@ -218,7 +218,8 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
                 "negative"
             };
             line.push(text(format!(
-                "; the nominal pose selects the {sign} root. Where the radicand is negative, the pose cannot be reached"
+                "; of the two solutions, the nominal pose selects the one with the {sign} square root. Where the expression under the \
+                 root is negative, the pose cannot be reached"
             )));
         }
         line.push(text("."));

@@ -230,7 +230,7 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     // Errors are compared with this figure.
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
-        format!("The forces are noise-free: errors of about {floor} are rounding.")
+        format!("The forces contain no noise; their rounding alone causes errors of about {floor}.")
     } else {
         // Only then a reader asks how an error can be smaller.
         let last = diagnosis.steps.last();
@@ -271,9 +271,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
-        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing of the remaining error",
+        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing in addition to the effects found",
         RejectionReason::ExplainsNothing => "explains almost none of the error",
-        RejectionReason::OnlyNoiseRemains if has_findings => "not needed: it would only fit noise or rounding",
+        RejectionReason::OnlyNoiseRemains if has_findings => "not needed in addition to the effects found: it would only fit noise or rounding",
         RejectionReason::OnlyNoiseRemains => "the residual is only noise or rounding",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
         RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",
@@ -648,9 +648,20 @@ fn disturbances(diagnosis: &ModelDiagnosis, channels: &[String]) -> Option<Strin
 /// The meaning of a kind of effect that is in no library, as a sentence; `None` for other kinds.
 pub(crate) fn meaning(kind: &str) -> Option<&'static str> {
     Some(match kind {
-        "drive_gain" => "The measured force is 1 + gain times the true force.",
-        "force_lag" => "The measured force is the true one after a first-order low-pass with time constant tau.",
+        "backlash" => "Play between the motor and the joint.",
+        "constant_error" => "A length or an angle of the model file has a wrong value.",
         "dahl_friction" => "Dry friction that builds up over a distance after each reversal.",
+        "drive_compliance" => "A drive that deflects elastically between the motor and the joint.",
+        "drive_gain" => "The measured force is 1 + gain times the true force, during the whole recording.",
+        "encoder_eccentricity" => "An error of the measured position that repeats with every turn.",
+        "encoder_zero" => "A wrong zero of a measured position.",
+        "force_lag" => "The measured force is the true one after a first-order low-pass with time constant tau.",
+        "friction_drift" => "Viscous and dry friction that change slowly during a recording, as by heat.",
+        "gain_change" => "The scale of the measured force changes at some time of a recording.",
+        "offset_drift" => "The zero of the measured force changes slowly during a recording.",
+        "offset_step" => "The zero of the measured force changes at some time of a recording.",
+        "payload" => "A load at the end of the mechanism.",
+        "payload_change" => "A load that is picked up or put down at some time of a recording.",
         _ => return None,
     })
 }

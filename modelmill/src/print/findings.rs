@@ -312,33 +312,38 @@ impl DiagnosisFindings {
             }
         }
         lines.push(String::new());
-        lines.push(style.bold("Residual of each drive, split by origin (rms, relative to its rms force)"));
+        let of = if self.missing.is_empty() { "" } else { " with the effects found" };
+        lines.push(style.bold(&format!(
+            "Remaining error of each drive{of}, split by origin (rms, relative to its rms force)"
+        )));
+        let has_removed = diagnosis.budgets.iter().any(|budget| budget.subtracted > 0.0);
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
                 // Noise, what varies with time, and what a model could explain; disturbances are no part of the residual.
                 let of = |x: f64| part(x, budget.force);
-                vec![
-                    channel.clone(),
-                    of(budget.noise),
-                    of(budget.in_time),
-                    of(budget.model),
-                    of(budget.subtracted),
-                ]
+                let mut row = vec![channel.clone(), of(budget.noise), of(budget.in_time), of(budget.model)];
+                row.extend(has_removed.then(|| of(budget.subtracted)));
+                row
             })
             .collect();
-        lines.extend(table(
-            2,
-            &[
-                ("drive", ColumnAlignment::Left),
-                ("noise or rounding", ColumnAlignment::Right),
-                ("varies with time only", ColumnAlignment::Right),
-                ("model error", ColumnAlignment::Right),
-                ("disturbances, subtracted before the fit", ColumnAlignment::Right),
-            ],
-            &rows,
-        ));
+        let mut columns = vec![
+            ("drive", ColumnAlignment::Left),
+            ("noise or rounding", ColumnAlignment::Right),
+            ("depends on time, not on motion", ColumnAlignment::Right),
+            ("model error", ColumnAlignment::Right),
+        ];
+        columns.extend(has_removed.then_some(("removed before the fit (disturbances)", ColumnAlignment::Right)));
+        lines.extend(table(2, &columns, &rows));
+    }
+
+    /// The meaning of a kind of effect in a sentence: that of its library, since users can add kinds, or else that of the
+    /// kinds of the diagnosis.
+    pub(crate) fn kind_meaning(&self, name: &str) -> Option<&str> {
+        let mut kinds = self.answer.candidates.kinds.iter();
+        let kind = kinds.find(|kind| kind.name == name);
+        kind.map_or_else(|| words::meaning(name), |kind| Some(kind.says.as_str()))
     }
 
     /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
@@ -362,12 +367,7 @@ impl DiagnosisFindings {
                 words::effect(&found.effect),
                 values_text(&found.estimates)
             ));
-            // Kinds of the libraries have a text of their own; others are explained here.
-            // The text of the library comes first, since users can add kinds.
-            let mut kinds = self.answer.candidates.kinds.iter();
-            let kind = kinds.find(|kind| kind.name == found.effect.kind);
-            let meaning = kind.map_or_else(|| words::meaning(&found.effect.kind), |kind| Some(kind.says.as_str()));
-            if let Some(meaning) = meaning.filter(|_| is_first) {
+            if let Some(meaning) = self.kind_meaning(name).filter(|_| is_first) {
                 let wrapped = wrap_words(meaning, 96);
                 lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
             }
@@ -450,25 +450,26 @@ impl DiagnosisFindings {
     fn refused_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let has_findings = self.diagnosis.steps.len() > 1;
         // Candidates are sorted by what they explain alone, so the first are the closest rivals.
-        let candidates = self.diagnosis.candidates.iter();
-        let rows: Vec<Vec<String>> = candidates
-            .filter_map(|c| {
-                let why = c.rejection_reason?;
-                (c.explained > NAMED_LEAST_SHARE).then(|| {
-                    vec![
-                        words::effect(&c.effect),
-                        percent(Some(c.explained)),
-                        words::refusal(why, has_findings).to_owned(),
-                    ]
-                })
+        let all = || (self.diagnosis.candidates.iter()).filter_map(|one| Some((one, one.rejection_reason?)));
+        let rejected = || all().filter(|(one, _)| one.explained > NAMED_LEAST_SHARE).take(MOST_CANDIDATES);
+        let rows: Vec<Vec<String>> = rejected()
+            .map(|(one, why)| {
+                vec![
+                    words::effect(&one.effect),
+                    percent(Some(one.explained)),
+                    words::refusal(why, has_findings).to_owned(),
+                ]
             })
-            .take(MOST_CANDIDATES)
             .collect();
         if rows.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Rejected candidates, with the share of the squared error that each explains alone"));
+        lines.push(style.bold(&format!(
+            "Rejected candidates: {} of {}, with the share of the squared error that each explains alone",
+            rows.len(),
+            all().count()
+        )));
         lines.extend(table(
             2,
             &[
@@ -478,6 +479,17 @@ impl DiagnosisFindings {
             ],
             &rows,
         ));
+        // Each kind is explained once, here or with the missing effects.
+        let mut explained: Vec<&str> = self.missing.iter().map(|found| found.effect.kind.as_str()).collect();
+        for (one, _) in rejected() {
+            let name = one.effect.kind.as_str();
+            let meaning = self.kind_meaning(name).filter(|_| !explained.contains(&name));
+            if let Some(meaning) = meaning {
+                explained.push(name);
+                let says = format!("{}: {meaning}", words::kind(name));
+                lines.extend(wrap_words(&says, 96).iter().map(|line| style.dim(&format!("    {line}"))));
+            }
+        }
     }
 
     /// Effects that these recordings can neither show nor exclude, each with the experiment that would decide.

@@ -141,7 +141,8 @@ fn steps_section(findings: &DiagnosisFindings) -> String {
          The line of the noise or rounding is computed from all recordings together.</p>\n<ul>\n\
          <li><i>decrease of the squared error</i>: relative to the step before, evaluated {} and only for the drives on \
          which the added effects act.</li>\n\
-         <li><i>t value of the decrease</i>: its mean over blocks of time, divided by its standard error.</li>\n\
+         <li><i>t value of the decrease</i>: the validation run is cut into blocks of time; the t value is the mean decrease of \
+         a block, divided by the standard error of this mean.</li>\n\
          <li><i>effective samples</i>: the number of independent samples that carry as much information as the samples of the \
          residual, which are correlated in time.</li>\n</ul>\n{}\
          <p><i>upper bound of the noise</i>: computed from differences of successive samples. The standard deviations \

@@ -1,5 +1,6 @@
 //! Tables of the page as HTML: steps, effects, candidates, parameters, recordings with notes.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use modelmill_identify::diagnose::CandidateOutcome;
@@ -284,7 +285,24 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
             table("sortable", &head, &rows[split..])
         );
     }
-    html
+    html + &kind_meanings(findings)
+}
+
+/// What the kinds of the candidates mean, as a folded list; empty if no kind has a text.
+fn kind_meanings(findings: &DiagnosisFindings) -> String {
+    let names: BTreeSet<&str> = (findings.diagnosis.candidates.iter())
+        .map(|one| one.effect.kind.as_str())
+        .collect();
+    let row = |name: &&str| {
+        let meaning = findings.kind_meaning(name)?;
+        Some(vec![TableCell::text(&words::kind(name)), TableCell::text(meaning)])
+    };
+    let rows: Vec<Vec<TableCell>> = names.iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let table = table("", &["kind", "meaning"], &rows);
+    format!("<details>\n<summary>What the kinds mean</summary>\n{table}</details>\n")
 }
 
 /// A share in per cent; less than 0.05 % is printed as 0.

@@ -77,9 +77,9 @@ impl TourText {
             "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
              model file has {} (two cranks and two couplers), {} and {}. The elbows and the platform are point masses. The screws \
              are the drives spindle_left and spindle_right. The angles of the cranks are theta1 and theta2; those of the couplers, \
-             relative to the cranks, are gamma1 and gamma2. The lengths of crank (d1) and coupler (d3) are known; masses, inertias and the distances of the \
-             centres of mass (dc1, dc3) are unknown. The forces of the screws are linear in {} of unknown parameters, such as m1*dc1. Many of these \
-             products always act together. Measurements can determine only {} combinations of them, the \
+             relative to the cranks, are gamma1 and gamma2. The lengths of crank (d1) and coupler (d3) are known; of the masses, inertias and distances of the \
+             centres of mass (dc1, dc3), the file has nominal values, which are not known exactly. The forces of the screws are linear \
+             in {} of these parameters, such as m1*dc1. Many of these products always act together. Measurements can determine only {} combinations of them, the \
              base parameters. modelmill finds these symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
@@ -102,9 +102,9 @@ impl TourText {
     pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
         self.heading("2  Compare: where is the error large?");
         self.paragraph(&format!(
-            "The recording is simulated: a third-party multibody program computed the motion and the forces of a complete robot, \
-             which has one effect that the model file lacks. With the nominal parameters, the error of the model is {} of the \
-             force (nrms: rms of the error divided by rms of the measured force). The upper curve is the force of one ball \
+            "This step compares the forces of the model with those of a recording. The recording is not from a real machine: a third-party \
+             multibody program simulated the robot with one effect that the model file lacks. With the nominal values of the parameters, \
+             the error of the model is {} of the force (nrms: rms of the error divided by rms of the measured force). The upper curve is the force of one ball \
              screw, the lower curve its error. Each curve has its own scale:",
             percent(seen.compared.figures.nrms)
         ));
@@ -299,12 +299,12 @@ impl TourText {
     pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
         self.heading("6  Diagnose a published model");
         self.paragraph(
-            "The paper that describes this robot reports an error of its model. modelmill finds a cause that the paper does not name. \
-             Each coupler carries half of the platform's mass m4 as a point mass, but the equations of the paper use two different \
+            "In the paper on this robot, the forces of the model differ from those of a simulation. modelmill finds a cause that the paper \
+             does not name. Each coupler carries half of the platform's mass m4 as a point mass, but the equations of the paper use two different \
              points for it. In the balance of forces it is at the end of the coupler (R3m or R3m_right). In the balance of moments it is at the \
-             coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines this cause and those of the paper. The \
-             recordings are other simulations of this robot, with massless screws. The base parameters are fixed at their nominal values \
-             (`--held`), as in step 2:",
+             coupler's centre of mass. The page docs/experiment.html in the repository of modelmill examines this cause, and also those that the paper suggests. The \
+             recordings are other simulations of this robot, with massless screws. As in step 2, the base parameters are \
+             not identified but keep their nominal values (option `--held`):",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
