@@ -83,6 +83,8 @@ impl Model {
                 adopted.parameters.push((name, value));
             }
         }
+        // Gains are no part of the base parameters of bodies.
+        adopted.parameters.extend(values.gains);
         let text =
             write_identified(self.text(), &adopted).map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
         // The edited text is read again, so that an invalid edit cannot be returned.

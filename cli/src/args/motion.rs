@@ -12,14 +12,18 @@ use crate::args::separate::SeparateArgs;
 /// `simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArgs {
-    /// Rig file (TOML), or a model file with --data
+    /// Rig file (TOML), or a model file with --data or --command
     pub(crate) rig: PathBuf,
     /// Trajectory of the rig (CSV): time t and the coordinates, with or without derivatives
-    #[arg(long, value_name = "TRAJ.csv", required_unless_present = "data")]
+    #[arg(long, value_name = "TRAJ.csv", required_unless_present_any = ["data", "command"])]
     pub(crate) trajectory: Option<PathBuf>,
-    /// Recording whose forces drive a model, from its first state
+    /// Recording whose forces drive a model, from its first state; if it has none, those of the model's actuators
     #[arg(long, value_name = "RUN", conflicts_with_all = ["trajectory", "seed"])]
     pub(crate) data: Option<PathBuf>,
+    /// Recording whose commands, or other signals of actuators, drive a model, from its first state; its forces are not
+    /// used
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["trajectory", "seed", "data"])]
+    pub(crate) command: Option<PathBuf>,
     /// Values of the base parameters of a model: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,

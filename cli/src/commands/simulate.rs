@@ -15,32 +15,38 @@ use crate::{commands, terminal};
 
 /// Writes `t`, the coordinates and one column per drive; for a model also the rates.
 pub(crate) fn run(host: &Host, args: &SimulateArgs) -> CommandOutcome {
-    match (&args.data, &args.trajectory) {
+    match (args.data.as_ref().or(args.command.as_ref()), &args.trajectory) {
         (Some(data), _) => simulate_model(host, args, data),
         (None, Some(trajectory)) => simulate_rig(host, args, trajectory),
         (None, None) => Err(CommandFailure::Usage(
-            "--trajectory of a rig or --data of a model is needed".to_owned(),
+            "--trajectory of a rig, or --data or --command of a model, is needed".to_owned(),
         )),
     }
 }
 
-/// The motion of a model under the forces of a recording.
+/// The motion of a model under the forces or the signals of a recording.
 fn simulate_model(host: &Host, args: &SimulateArgs, data: &Path) -> CommandOutcome {
-    let model = commands::model(host, &args.rig)?;
+    let model = args.parameters.apply_to(host, commands::model(host, &args.rig)?)?;
     let inputs = commands::files_of(data);
     let inputs = model.files().chain(inputs.iter().map(PathBuf::as_path));
     let inputs: Vec<&Path> = inputs.chain(args.parameters.file().map(PathBuf::as_path)).collect();
     let target = OutputFile::new(&args.out, inputs)?;
-    let values = args.parameters.values(host, &model)?;
     let reading = RecordingOptions {
         columns: args.map.clone(),
         ..RecordingOptions::default()
     };
-    let [recordings, _] = commands::recordings(&model, [&[data.to_owned()], &[]], &reading)?;
-    let Some(recording) = recordings.first() else {
+    let files = commands::files_of(data);
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    let runs = [files];
+    let [mut recordings, _] = if args.command.is_some() {
+        model.prepare_recordings_from_signals([&runs, &[]], &reading)
+    } else {
+        model.prepare_recordings_with_signals([&runs, &[]], &reading)
+    };
+    let Some(recording) = recordings.pop() else {
         return Err(CommandFailure::Input(format!("{} has no samples", data.display())));
     };
-    let made = model.simulate_motion(recording, &values)?;
+    let made = model.simulate_motion(&recording?, &model.values)?;
     target.write(&made.csv())?;
     if args.json {
         return terminal::print_json(&json!({
@@ -48,14 +54,16 @@ fn simulate_model(host: &Host, args: &SimulateArgs, data: &Path) -> CommandOutco
             "parameters": args.parameters.name(),
             "out": args.out.display().to_string(),
             "samples": made.samples(),
+            "input": made.input.name(),
             "coordinates": made.coordinates,
         }));
     }
     terminal::note(&format!(
-        "{}: {} of {} under the forces of {}",
+        "{}: {} of {} under the {} of {}",
         target.path().display(),
         count(made.samples(), "sample", "samples"),
         made.coordinates.join(", "),
+        made.input.name(),
         data.display()
     ));
     Ok(())

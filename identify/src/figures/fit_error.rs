@@ -25,6 +25,8 @@ pub enum FitFault {
         /// Message of the operating system.
         reason: String,
     },
+    /// The fit is from signals that determine only ratios of parameters.
+    OnlyRatios,
     /// The text is not the JSON of `identify`.
     NotAFit {
         /// Line of the fault.
@@ -100,6 +102,11 @@ impl FitFileError {
             FitFault::NotAFit { line, column, reason } => message!(
                 "{file}, line {line}, column {column}: this is not the JSON that {} writes: \
                  {reason}",
+                identify
+            ),
+            FitFault::OnlyRatios => message!(
+                "{file} has only ratios of parameters: no number of the model file fixed the scale; give one of those that {} names, \
+                 and identify again",
                 identify
             ),
             FitFault::NoJson => message!(

@@ -83,6 +83,28 @@ pub struct FitParameter {
     pub status: ParameterStatus,
 }
 
+/// An identified gain of an actuator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitGain {
+    /// Its name in `[parameters]` of the model file.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+    /// Standard deviation; `null` for a value that was not identified.
+    pub std: Option<f64>,
+    /// Unit of the value.
+    pub unit: String,
+}
+
+/// What the JSON of an identification from signals contains for its readers.
+#[derive(Deserialize)]
+struct SignalFitFile {
+    /// `signals`.
+    source: String,
+    /// The fit of the model without actuators; absent if only ratios are known.
+    model_fit: Option<FitFile>,
+}
+
 /// An identification: the JSON of `identify`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitFile {
@@ -97,6 +119,9 @@ pub struct FitFile {
     pub scaled_condition_number: Option<f64>,
     /// The base parameters, in the order of the regressor's columns.
     pub parameters: Vec<FitParameter>,
+    /// Gains of actuators, if the fit is from their signals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gains: Vec<FitGain>,
     /// Covariance of the values, row by row in the order of `parameters`, in the products of their units; omitted if a
     /// standard deviation is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -111,7 +136,8 @@ pub struct FitFile {
     /// Directions that the recording does not determine, one sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<String>,
-    /// Error figures on the recordings of the fit.
+    /// Error figures on the recordings of the fit; none in a fit from signals.
+    #[serde(default)]
     pub fit: ErrorFigures,
     /// Error figures on the validation runs, if any.
     pub check: Option<ErrorFigures>,
@@ -230,6 +256,14 @@ impl FitFile {
             return Err(FitFileError {
                 file: file.to_owned(),
                 fault: FitFault::NoJson,
+            });
+        }
+        if let Ok(signals) = serde_json::from_str::<SignalFitFile>(text)
+            && signals.source == "signals"
+        {
+            return signals.model_fit.ok_or_else(|| FitFileError {
+                file: file.to_owned(),
+                fault: FitFault::OnlyRatios,
             });
         }
         serde_json::from_str(text).map_err(|error| {

@@ -24,13 +24,13 @@ use serde::{Deserialize, Serialize};
 pub use equation_sample::EquationSample;
 pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
+pub use fit_file::{EstimatorOutput, FitFile, FitGain, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
 pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
 pub use residual_by_rate::{DriveResidual, RateDependence, RateTerm, ResidualLevels, find_rate_dependence};
 pub use thresholds::TRIMMED_PART;
 
 /// Error figures of a comparison.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ErrorFigures {
     /// Relative error over all channels stacked; absent if all measured values are zero, and if channels have different
     /// units, whose squares cannot be added.

@@ -173,6 +173,11 @@ impl SignalRecording {
         column.values = values;
     }
 
+    /// Removes a column, if there is one of this name.
+    pub fn remove_column(&mut self, name: &str) {
+        self.columns.shift_remove(name);
+    }
+
     /// The samples from `start` up to, but not including `end` as a recording of its own, without notes.
     pub(crate) fn extract_segment(&self, file: String, start: usize, end: usize) -> Self {
         let columns = self.columns.iter().map(|(name, column)| {

@@ -273,7 +273,9 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         }
         RejectionReason::ExplainsNothing if has_findings => "explains almost nothing in addition to the effects found",
         RejectionReason::ExplainsNothing => "explains almost none of the error",
-        RejectionReason::OnlyNoiseRemains if has_findings => "not needed in addition to the effects found: it would only fit noise or rounding",
+        RejectionReason::OnlyNoiseRemains if has_findings => {
+            "not needed in addition to the effects found: it would only fit noise or rounding"
+        }
         RejectionReason::OnlyNoiseRemains => "the residual is only noise or rounding",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",
         RejectionReason::NotConfirmedByFolds => "not confirmed by cross-validation",

@@ -14,11 +14,13 @@ use crate::segment::RecordingSegment;
 
 use super::plant::MotionPlant;
 use super::thresholds::{DISTURBANCE, HORIZONS_S, MOST_GROWTH, MOST_SIMULATED_S};
-use super::{SimulationCursor, fastest_rate, rollout};
+use super::{SimulationCursor, SimulationInput, rollout};
 
 /// Position errors of a simulated model over several horizons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForwardComparison {
+    /// What drives the simulated model.
+    pub input: SimulationInput,
     /// Names of the active (independent) coordinates, as in [`Model::active_coordinates`].
     pub coordinates: Vec<String>,
     /// Whether each coordinate is an angle (rad) or a length (m).
@@ -57,16 +59,26 @@ impl Model {
     ///
     /// Fails if a recording has no forces, or the model has free bodies.
     pub fn compare_forward(&self, recordings: &[&PreparedRecording], values: &[f64]) -> Outcome<ForwardComparison> {
+        self.compare_over(recordings, values, &HORIZONS_S)
+    }
+
+    /// As [`Model::compare_forward`], over other horizons than 0.1 s and 1 s, in s, in increasing order.
+    pub(crate) fn compare_over(
+        &self,
+        recordings: &[&PreparedRecording],
+        values: &[f64],
+        seconds: &[f64],
+    ) -> Outcome<ForwardComparison> {
         let dynamics = self.forward_programs()?;
         let segments: Vec<&RecordingSegment> = recordings.iter().flat_map(|one| &one.segments).collect();
         let plants: Vec<MotionPlant<'_>> = segments
             .iter()
-            .map(|segment| MotionPlant::new(self, &dynamics, values, fastest_rate(segment)))
+            .map(|segment| MotionPlant::new(self, &dynamics, values, segment))
             .collect();
         self.host().run_job("simulating forward in time", 0, |_| {
             let longest_horizon = divergence_horizon(&plants, &segments)?;
             let whole = segments.iter().map(|one| duration(one)).fold(0.0, f64::max);
-            let shorter = HORIZONS_S.iter().filter(|seconds| **seconds < whole);
+            let shorter = seconds.iter().filter(|seconds| **seconds < whole);
             let all: Vec<(f64, bool)> = shorter.map(|s| (*s, false)).chain([(whole, true)]).collect();
             // Horizons that say nothing about the model are not simulated.
             let one = |(seconds, is_whole_run): (f64, bool)| {
@@ -75,6 +87,7 @@ impl Model {
             };
             let horizons = all.into_iter().map(one).collect::<Outcome<Vec<_>>>()?;
             Ok(ForwardComparison {
+                input: SimulationInput::of(&segments),
                 coordinates: self.active_coordinates(),
                 is_angle: self
                     .active_coordinate_types()

@@ -9,7 +9,8 @@ use modelmill_codegen::PoseFault;
 use modelmill_identify::float_to_count;
 
 use super::plant::MotionPlant;
-use super::thresholds::{LONGEST_STEP_S, MOST_EVENTS, STOPPED_PART};
+use super::thresholds::{MOST_EVENTS, STOPPED_PART};
+use crate::segment::computed_forces::ComputedForces;
 
 /// State of a simulation.
 #[derive(Clone, Debug)]
@@ -22,17 +23,41 @@ pub(super) struct MotionState {
     stuck: Vec<usize>,
 }
 
-/// Forces of the drives at the start and at the end of an interval; they are interpolated linearly.
+/// Forces of the drives between two samples.
 pub(super) struct ForceInterval<'a> {
+    /// Recorded forces at the start; they are interpolated linearly.
     pub(super) start: &'a [f64],
+    /// Recorded forces at the end.
     pub(super) end: &'a [f64],
+    /// Times of both samples, s.
+    pub(super) time: [f64; 2],
+    /// Actuators whose forces follow from their signals and the simulated motion, in place of recorded ones.
+    pub(super) computed: Option<&'a ComputedForces>,
 }
 
 impl ForceInterval<'_> {
-    /// Forces at a part of the interval, 0 to 1.
-    fn forces_at(&self, part: f64) -> Vec<f64> {
+    /// Forces at a part of the interval, 0 to 1, and a state.
+    pub(super) fn forces_at(
+        &self,
+        plant: &MotionPlant<'_>,
+        part: f64,
+        [q, qd]: [&[f64]; 2],
+    ) -> Result<Vec<f64>, PoseFault> {
         let pairs = self.start.iter().zip(self.end);
-        pairs.map(|(a, b)| a + part * (b - a)).collect()
+        let mut forces: Vec<f64> = pairs.map(|(a, b)| a + part * (b - a)).collect();
+        let Some(computed) = self.computed else {
+            return Ok(forces);
+        };
+        let [start, end] = self.time;
+        let t = start + part * (end - start);
+        let motion = plant.drive_motion(q, qd)?;
+        for actuator in &computed.actuators {
+            forces[actuator.drive] = 0.0;
+        }
+        for actuator in &computed.actuators {
+            forces[actuator.drive] += actuator.force(&computed.time, t, motion[actuator.drive]);
+        }
+        Ok(forces)
     }
 }
 
@@ -61,7 +86,7 @@ pub(super) fn advance(
     duration: f64,
     forces: &ForceInterval<'_>,
 ) -> Result<(), PoseFault> {
-    let steps = float_to_count((duration / LONGEST_STEP_S - 1e-6).ceil().max(1.0));
+    let steps = float_to_count((duration / plant.longest_step() - 1e-6).ceil().max(1.0));
     for k in 0..steps {
         let [start, end] = [k, k + 1].map(|k| k as f64 / steps as f64);
         advance_step(plant, state, duration, [start, end], forces)?;
@@ -82,12 +107,13 @@ fn advance_step(
         return Ok(());
     }
     for event in 0..=MOST_EVENTS {
-        release(plant, state, &forces.forces_at(start))?;
+        let at = |part: f64, state: &MotionState| forces.forces_at(plant, part, [&state.q, &state.qd]);
+        release(plant, state, &at(start, state)?)?;
         let next = runge_kutta(plant, state, duration, [start, end], forces)?;
         let before = plant.place_rates(&state.q, &state.qd)?;
         // Stages beyond a reversal turn the friction around, so that the end of the step may not show it. The slope
         // at the start does.
-        let slope = plant.accelerations(&state.q, &state.qd, &forces.forces_at(start), &state.stuck)?;
+        let slope = plant.accelerations(&state.q, &state.qd, &at(start, state)?, &state.stuck)?;
         let h = duration * (end - start);
         let predicted: Vec<f64> = state.qd.iter().zip(&slope).map(|(v, a)| v + h * a).collect();
         let predicted = plant.place_rates(&state.q, &predicted)?;
@@ -103,7 +129,7 @@ fn advance_step(
             }
             let part = before[place] / (before[place] - after[place]);
             if first.is_none_or(|(other, _)| part < other)
-                && plant.has_dry_friction(&next.q, &next.qd, &forces.forces_at(end), place)?
+                && plant.has_dry_friction(&next.q, &next.qd, &at(end, &next)?, place)?
             {
                 first = Some((part, place));
             }
@@ -161,7 +187,10 @@ fn runge_kutta(
     let h = duration * (end - start);
     let sum =
         |a: &[f64], factor: f64, b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + factor * b).collect() };
-    let slope = |q: &[f64], qd: &[f64], part: f64| plant.accelerations(q, qd, &forces.forces_at(part), &state.stuck);
+    let slope = |q: &[f64], qd: &[f64], part: f64| {
+        let forces = forces.forces_at(plant, part, [q, qd])?;
+        plant.accelerations(q, qd, &forces, &state.stuck)
+    };
     let middle = 0.5 * (start + end);
     let a1 = slope(&state.q, &state.qd, start)?;
     let v2 = sum(&state.qd, 0.5 * h, &a1);

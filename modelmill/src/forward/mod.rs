@@ -20,6 +20,43 @@ use crate::text::csv::csv;
 pub use horizons::{ForwardComparison, HorizonError};
 use integrate::{ForceInterval, MotionState, advance};
 use plant::MotionPlant;
+pub(crate) use thresholds::VERIFIED_HORIZON_S;
+
+/// What drives a simulated model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SimulationInput {
+    /// The forces of the recording.
+    Forces,
+    /// The commands of its servos: forces follow from commands and the simulated motion.
+    Commands,
+    /// Other signals of actuators, such as currents or voltages, alone or with commands: forces follow from them and the
+    /// simulated motion.
+    Signals,
+}
+
+impl SimulationInput {
+    /// Its name in JSON and text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Forces => "forces",
+            Self::Commands => "commands",
+            Self::Signals => "signals",
+        }
+    }
+
+    /// What drives the simulations of some segments.
+    fn of(segments: &[&RecordingSegment]) -> Self {
+        let computed = segments.iter().filter_map(|one| one.computed.as_deref());
+        let mut actuators = computed.flat_map(|one| &one.actuators).peekable();
+        if actuators.peek().is_none() {
+            Self::Forces
+        } else if actuators.all(|one| one.is_commanded) {
+            Self::Commands
+        } else {
+            Self::Signals
+        }
+    }
+}
 
 /// A simulated motion at the times of a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,8 +69,11 @@ pub struct SimulatedMotion {
     pub q: Vec<Vec<f64>>,
     /// `qd[coordinate][sample]`, rad/s or m/s.
     pub qd: Vec<Vec<f64>>,
-    /// Names of the drives and their forces, N or N m, as recorded.
+    /// Names of the drives and their forces, N or N m: those of the recording, or those of actuators along the simulated
+    /// motion.
     pub forces: Vec<(String, Vec<f64>)>,
+    /// What drives the model.
+    pub input: SimulationInput,
 }
 
 impl SimulatedMotion {
@@ -69,7 +109,8 @@ impl SimulatedMotion {
 
 impl Model {
     /// Simulates the model under the forces of a recording, from its first state. `values` are those of the base
-    /// parameters. Forces are interpolated linearly between samples. Drives and coordinates with dry friction stick
+    /// parameters. Forces are interpolated linearly between samples. Forces that were computed from the signals of actuators
+    /// ([`Model::prepare_recordings_from_signals`]) follow from these signals and the simulated motion. Drives and coordinates with dry friction stick
     /// when friction can keep them at standstill.
     ///
     /// Fails if the recording has gaps or no forces, if the model has free bodies, and when the simulated motion
@@ -83,7 +124,7 @@ impl Model {
             )));
         };
         let dynamics = self.forward_programs()?;
-        let plant = MotionPlant::new(self, &dynamics, values, fastest_rate(segment));
+        let plant = MotionPlant::new(self, &dynamics, values, segment);
         let n = segment.samples();
         let found = self
             .host()
@@ -98,13 +139,14 @@ impl Model {
                 reason_text(&reason)
             )));
         }
-        let measured = segment.run.measured_forces()?;
+        let forces = simulated_forces(&plant, segment, &found)?;
         Ok(SimulatedMotion {
             time: segment.run.time.clone(),
             coordinates: self.active_coordinates(),
             q: found.q,
             qd: found.qd,
-            forces: self.row_names().into_iter().zip(measured.iter().cloned()).collect(),
+            forces: self.row_names().into_iter().zip(forces).collect(),
+            input: SimulationInput::of(&[segment]),
         })
     }
 
@@ -170,11 +212,13 @@ impl<'a> SimulationCursor<'a> {
     fn step(&mut self, plant: &MotionPlant<'_>) -> Result<(), PoseFault> {
         let sample = self.sample;
         let [start, end] = [sample, sample + 1].map(|sample| values_at(self.forces, sample));
+        let time = &self.segment.run.time;
         let forces = ForceInterval {
             start: &start,
             end: &end,
+            time: [time[sample], time[sample + 1]],
+            computed: self.segment.computed.as_deref(),
         };
-        let time = &self.segment.run.time;
         advance(plant, &mut self.state, time[sample + 1] - time[sample], &forces)?;
         self.sample += 1;
         if self.state.is_finite() {
@@ -218,6 +262,33 @@ fn rollout(plant: &MotionPlant<'_>, segment: &RecordingSegment, [start, end]: [u
     }
 }
 
+/// Forces of the drives along a simulated motion of a complete segment, `[drive][sample]`.
+///
+/// Fails when the recording has no forces.
+fn simulated_forces(
+    plant: &MotionPlant<'_>,
+    segment: &RecordingSegment,
+    made: &MotionRollout,
+) -> Outcome<Vec<Vec<f64>>> {
+    let mut forces = segment.run.measured_forces()?.to_vec();
+    for (sample, t) in segment.run.time.iter().enumerate() {
+        let recorded = values_at(&forces, sample);
+        let interval = ForceInterval {
+            start: &recorded,
+            end: &recorded,
+            time: [*t, *t],
+            computed: segment.computed.as_deref(),
+        };
+        let [q, qd] = [&made.q, &made.qd].map(|columns| values_at(columns, sample));
+        // The rollout has reached every state, so that it has a solution.
+        let at_state = interval.forces_at(plant, 0.0, [&q, &qd]).unwrap_or(recorded);
+        for (column, force) in forces.iter_mut().zip(at_state) {
+            column[sample] = force;
+        }
+    }
+    Ok(forces)
+}
+
 /// Why a motion ended early, as a clause.
 fn reason_text(reason: &PoseReason) -> &'static str {
     match reason {
@@ -225,11 +296,4 @@ fn reason_text(reason: &PoseReason) -> &'static str {
         PoseReason::Singular => "the mechanism is singular",
         PoseReason::Undefined | PoseReason::NotFinite { .. } => "a value is not finite",
     }
-}
-
-/// The fastest rate of a coordinate in a segment, rad/s or m/s; 1 if nothing moves.
-fn fastest_rate(segment: &RecordingSegment) -> f64 {
-    let rates = segment.run.qd.iter().flatten().map(|rate| rate.abs());
-    let fastest = rates.fold(0.0, f64::max);
-    if fastest > 0.0 { fastest } else { 1.0 }
 }

@@ -9,12 +9,14 @@
 //! so that every kind of friction is included, also those of a user's library.
 
 use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault};
-use modelmill_spec::{DriveKind, EffectPlace};
+use modelmill_spec::{DriveKind, EffectPlace, ModelDrive};
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
 
-use super::thresholds::LEAST_DRY_FRICTION;
+use super::thresholds::{DIRECTION_RATE, LEAST_DRY_FRICTION, LONGEST_STEP_S, SHORTEST_STEP_S, STEP_OF_SERVO};
+use crate::segment::RecordingSegment;
+use crate::segment::computed_forces::ComputedForces;
 
 /// A place where dry friction may act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +36,12 @@ pub(super) struct MotionPlant<'a> {
     n: usize,
     n_drives: usize,
     places: Vec<FrictionPlace>,
+    /// The independent coordinate of each drive; `None` if a drive moves another coordinate.
+    drive_coordinates: Option<Vec<usize>>,
     /// The rate that decides a direction at standstill, rad/s or m/s.
     direction_rate: f64,
+    /// Longest step of the integration, s.
+    longest_step: f64,
 }
 
 /// Friction at sticking places that would keep them at standstill.
@@ -58,35 +64,89 @@ struct StickEquation {
 }
 
 impl<'a> MotionPlant<'a> {
-    /// Prepares a model; `fastest` is the fastest rate of the motion.
-    pub(super) fn new(model: &'a Model, dynamics: &'a DynamicsPrograms, values: &'a [f64], fastest: f64) -> Self {
+    /// Prepares a model for a segment whose motion or signals it is to follow.
+    pub(super) fn new(
+        model: &'a Model,
+        dynamics: &'a DynamicsPrograms,
+        values: &'a [f64],
+        segment: &RecordingSegment,
+    ) -> Self {
         let mechanism = &model.derivation.mechanism;
         let active: Vec<usize> = (0..mechanism.coordinates.len())
             .filter(|i| !mechanism.coordinates[*i].passive)
             .collect();
+        let coordinate = |drive: &ModelDrive| match drive.kind {
+            DriveKind::Joint(c) => active.iter().position(|i| *i == c.0),
+            DriveKind::Linear { .. } => None,
+        };
         let mut places = Vec::new();
         let effects = mechanism.effects.iter().filter(|effect| effect.mechanics.is_none());
         for place in effects.flat_map(|effect| &effect.places) {
             let found = match place {
-                EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
-                    DriveKind::Joint(c) => active.iter().position(|i| *i == c.0).map(FrictionPlace::Coordinate),
-                    DriveKind::Linear { .. } => None,
+                EffectPlace::Drive(d) => {
+                    let own = coordinate(&mechanism.drives[d.0]).map(FrictionPlace::Coordinate);
+                    Some(own.unwrap_or(FrictionPlace::Drive(d.0)))
                 }
-                .or(Some(FrictionPlace::Drive(d.0))),
                 EffectPlace::Coordinate(c) => active.iter().position(|i| *i == c.0).map(FrictionPlace::Coordinate),
                 _ => None,
             };
             places.extend(found.filter(|one| !places.contains(one)));
         }
-        Self {
+        let mut plant = Self {
             evaluator: ModelEvaluator::new(&model.derivation),
             dynamics,
             values,
             n: active.len(),
             n_drives: mechanism.drives.len(),
             places,
-            direction_rate: fastest * super::thresholds::DIRECTION_RATE,
+            drive_coordinates: mechanism.drives.iter().map(coordinate).collect(),
+            direction_rate: fastest_rate(segment) * DIRECTION_RATE,
+            longest_step: LONGEST_STEP_S,
+        };
+        if let Some(computed) = &segment.computed
+            && let Some(fastest) = plant.servo_rate(segment, computed)
+            && fastest > 0.0
+        {
+            plant.longest_step = (STEP_OF_SERVO / fastest).clamp(SHORTEST_STEP_S, LONGEST_STEP_S);
         }
+        plant
+    }
+
+    /// Longest step of the integration, s.
+    pub(super) fn longest_step(&self) -> f64 {
+        self.longest_step
+    }
+
+    /// The fastest rate at which servos move the mechanism at the first state of a segment, 1/s: bounds of the eigenvalues
+    /// of `M^-1 J' D J` and of the square root of those of `M^-1 J' K J`, with stiffnesses K and dampings D. `None` at a
+    /// singular pose.
+    fn servo_rate(&self, segment: &RecordingSegment, computed: &ComputedForces) -> Option<f64> {
+        let q: Vec<f64> = segment.run.q.iter().map(|column| column[0]).collect();
+        let zeros = vec![0.0; self.n];
+        let states = single(&q, &zeros, &[]);
+        let mass = self.evaluator.mass_matrix(self.dynamics, &states, self.values).ok()?;
+        let inverse = solved(&self.square(&mass)).ok()?;
+        let jacobian = self.drive_jacobian(&q).ok()?;
+        let bound = |property: usize| {
+            let mut diagonal = DVector::zeros(self.n_drives);
+            for actuator in &computed.actuators {
+                diagonal[actuator.drive] += actuator.stiffness_and_damping()[property];
+            }
+            let product = &inverse * jacobian.transpose() * DMatrix::from_diagonal(&diagonal) * &jacobian;
+            let sums = product.row_iter().map(|row| row.iter().map(|x| x.abs()).sum::<f64>());
+            sums.fold(0.0, f64::max)
+        };
+        Some(bound(1).max(bound(0).sqrt())).filter(|rate| rate.is_finite())
+    }
+
+    /// Position and rate of each drive at a state.
+    pub(super) fn drive_motion(&self, q: &[f64], qd: &[f64]) -> Result<Vec<[f64; 2]>, PoseFault> {
+        if let Some(coordinates) = &self.drive_coordinates {
+            return Ok(coordinates.iter().map(|k| [q[*k], qd[*k]]).collect());
+        }
+        let found = (self.evaluator).drive_motion(&single(q, qd, &vec![0.0; self.n_drives]))?;
+        let drives = 0..self.n_drives;
+        Ok(drives.map(|d| [found[d][0], found[self.n_drives + d][0]]).collect())
     }
 
     /// Number of places where dry friction may act.
@@ -317,4 +377,11 @@ fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
 /// The solution of a linear system with the least norm.
 fn pseudo_solved(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     pseudo_inverse(matrix) * right
+}
+
+/// The fastest rate of a coordinate in a segment, rad/s or m/s; 1 if nothing moves.
+fn fastest_rate(segment: &RecordingSegment) -> f64 {
+    let rates = segment.run.qd.iter().flatten().map(|rate| rate.abs());
+    let fastest = rates.fold(0.0, f64::max);
+    if fastest > 0.0 { fastest } else { 1.0 }
 }

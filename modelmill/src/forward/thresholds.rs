@@ -4,6 +4,13 @@
 /// encoder noise for motions below 50 Hz.
 pub(super) const LONGEST_STEP_S: f64 = 1e-3;
 
+/// Longest step relative to the shortest time constant of the servos (1). The relative error of a step of the fourth
+/// order is then 0.3^5/120 = 2e-5.
+pub(super) const STEP_OF_SERVO: f64 = 0.3;
+
+/// Shortest step of the integration, s. By judgement: a servo that is faster than 50 kHz is a wrong gain.
+pub(super) const SHORTEST_STEP_S: f64 = 5e-6;
+
 /// Reversals of drives that are located within one step; more are passed over. By judgement.
 pub(super) const MOST_EVENTS: usize = 8;
 
@@ -17,6 +24,10 @@ pub(super) const DIRECTION_RATE: f64 = 1e-9;
 
 /// Dry friction below this part of the largest generalised force (1) is rounding. By judgement.
 pub(super) const LEAST_DRY_FRICTION: f64 = 1e-9;
+
+/// Horizon over which positions are verified if the file of limits gives none, s. By judgement: long enough for friction
+/// and inertia to show, and short enough for most machines to depend on the model.
+pub(crate) const VERIFIED_HORIZON_S: f64 = 1.0;
 
 /// Horizons over which positions are compared, s, in addition to the whole run. Issue: users of simulators compare
 /// rollouts of these lengths.

@@ -212,6 +212,7 @@ pub fn identify(
     let constants = &model.derivation.mechanism.constants;
     Ok(Identification {
         fit: FitFile {
+            gains: Vec::new(),
             model: model.name.clone(),
             samples: fit.samples,
             condition_number: finite(solution.condition_number),

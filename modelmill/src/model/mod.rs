@@ -510,16 +510,23 @@ impl Model {
         }
     }
 
-    /// The model with the values of a fit, see [`Model::values_of`].
+    /// The model with the values of a fit, see [`Model::values_of`]. Gains of actuators get the values of the fit as nominal
+    /// values.
     ///
     /// In a diagnosis with [`FixedParameters::All`](crate::diagnose::FixedParameters::All), a fit with a covariance is used
     /// as a prior; without one, the parameters are fixed at its values. Nothing else uses the covariance.
     #[must_use]
     pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
-        Self {
-            covariance: fit.covariance.clone().map(Arc::new),
-            ..self.with_values(&fit.values)
+        let mut model = self.with_values(&fit.values);
+        model.covariance = fit.covariance.clone().map(Arc::new);
+        if !fit.gains.is_empty() {
+            for parameter in &mut Arc::make_mut(&mut model.loaded).mechanism.parameters {
+                if let Some((_, value)) = fit.gains.iter().find(|(name, _)| *name == parameter.name) {
+                    (parameter.nominal, parameter.has_nominal) = (*value, true);
+                }
+            }
         }
+        model
     }
 
     /// The information matrix of some base parameters, the inverse of their covariance; `None` without one.

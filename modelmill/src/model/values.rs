@@ -13,6 +13,8 @@ pub struct BaseParameterValues {
     pub values: Vec<f64>,
     /// Their covariance, if a fit has it; rows and columns of parameters known from the file are zero.
     pub covariance: Option<DMatrix<f64>>,
+    /// Values of gains of actuators by name, if a fit has any.
+    pub gains: Vec<(String, f64)>,
     /// Notes on the values.
     pub notes: Vec<RecordingNote>,
 }
@@ -36,6 +38,7 @@ impl Model {
         BaseParameterValues {
             values: self.values.clone(),
             covariance: None,
+            gains: Vec::new(),
             notes,
         }
     }
@@ -68,6 +71,7 @@ impl Model {
         Ok(BaseParameterValues {
             values,
             covariance: self.covariance_of(fit),
+            gains: fit.gains.iter().map(|gain| (gain.name.clone(), gain.value)).collect(),
             notes: notes.collect(),
         })
     }

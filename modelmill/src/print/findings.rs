@@ -312,7 +312,11 @@ impl DiagnosisFindings {
             }
         }
         lines.push(String::new());
-        let of = if self.missing.is_empty() { "" } else { " with the effects found" };
+        let of = if self.missing.is_empty() {
+            ""
+        } else {
+            " with the effects found"
+        };
         lines.push(style.bold(&format!(
             "Remaining error of each drive{of}, split by origin (rms, relative to its rms force)"
         )));
@@ -451,7 +455,11 @@ impl DiagnosisFindings {
         let has_findings = self.diagnosis.steps.len() > 1;
         // Candidates are sorted by what they explain alone, so the first are the closest rivals.
         let all = || (self.diagnosis.candidates.iter()).filter_map(|one| Some((one, one.rejection_reason?)));
-        let rejected = || all().filter(|(one, _)| one.explained > NAMED_LEAST_SHARE).take(MOST_CANDIDATES);
+        let rejected = || {
+            all()
+                .filter(|(one, _)| one.explained > NAMED_LEAST_SHARE)
+                .take(MOST_CANDIDATES)
+        };
         let rows: Vec<Vec<String>> = rejected()
             .map(|(one, why)| {
                 vec![
@@ -487,7 +495,11 @@ impl DiagnosisFindings {
             if let Some(meaning) = meaning {
                 explained.push(name);
                 let says = format!("{}: {meaning}", words::kind(name));
-                lines.extend(wrap_words(&says, 96).iter().map(|line| style.dim(&format!("    {line}"))));
+                lines.extend(
+                    wrap_words(&says, 96)
+                        .iter()
+                        .map(|line| style.dim(&format!("    {line}"))),
+                );
             }
         }
     }

@@ -27,6 +27,7 @@ impl ForwardComparison {
             })
         };
         json!({
+            "input": self.input.name(),
             "horizons": self.horizons.iter().map(horizon).collect::<Vec<_>>(),
             "longest_horizon": self.longest_horizon,
         })
@@ -34,7 +35,11 @@ impl ForwardComparison {
 
     /// The errors as text, with the longest horizon over which they depend on the model.
     pub fn text(&self, style: TerminalStyle) -> String {
-        let mut lines = vec![style.bold("Position error when the model is simulated under the recorded forces")];
+        let title = format!(
+            "Position error when the model is simulated under the recorded {}",
+            self.input.name()
+        );
+        let mut lines = vec![style.bold(&title)];
         let mut rows = Vec::new();
         for one in &self.horizons {
             let name = if one.is_whole_run {

@@ -141,6 +141,7 @@ impl ServoIdentification {
                 "open": freedom.open,
                 "fixed_by": freedom.fixed_by,
             })).collect::<Vec<_>>(),
+            "model_fit": self.model_fit,
             "data": notes(&self.notes, wording),
         })
     }

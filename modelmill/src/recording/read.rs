@@ -60,6 +60,14 @@ impl UnpreparedRecording {
         other
     }
 
+    /// The same recording with other signals.
+    pub(crate) fn with_signals(&self, raw: Raw) -> Self {
+        Self {
+            raw: Arc::new(raw),
+            ..self.clone()
+        }
+    }
+
     /// The same recording with forces that were computed from its signals, and with further faults.
     pub(crate) fn with_computed_forces(&self, raw: Raw, computed: ComputedForces, faults: Vec<Disturbance>) -> Self {
         Self {

@@ -1,14 +1,17 @@
 //! What the forces of a recording depend on if they were computed from the signals of actuators and not measured.
 
 use super::RecordingSegment;
+use crate::servo::simulated::SimulatedActuator;
 
 /// Forces of a recording that were computed from signals.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ComputedForces {
-    /// Times of the samples of `delays`, s.
+    /// Times of the samples of `delays` and `actuators`, s.
     pub(crate) time: Vec<f64>,
     /// The delays that the forces depend on.
     pub(crate) delays: Vec<DelaySensitivity>,
+    /// The actuators, for simulations in which their forces follow from the simulated motion.
+    pub(crate) actuators: Vec<SimulatedActuator>,
 }
 
 /// How the force of a drive depends on the delay of one of its signals.

@@ -6,9 +6,11 @@
 
 use modelmill_boundary::message;
 use modelmill_identify::estimate::{EstimateOptions, RowVisitor, estimate, estimate_with_instruments};
-use modelmill_identify::{LeastSquaresError, ParameterUncertainty, RecordingNote, RegressionSolution};
+use modelmill_identify::{FitFile, LeastSquaresError, ParameterUncertainty, RecordingNote, RegressionSolution};
 
 use modelmill_spec::Sign;
+
+use nalgebra::{DMatrix, DVector};
 
 use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
@@ -109,6 +111,9 @@ pub struct ServoIdentification {
     pub check: Vec<ServoRowError>,
     /// Groups of base parameters of which the signals determine only ratios; empty if all values can be identified.
     pub scale: ServoScale,
+    /// The base parameters of the model without actuators, and the gains, for files that are read again; `None` if only
+    /// ratios can be known.
+    pub model_fit: Option<FitFile>,
     /// Notes on the result.
     pub notes: Vec<RecordingNote>,
 }
@@ -145,7 +150,7 @@ impl ServoModel {
                 solved = system.solve(&values)?;
             }
         }
-        let spread = system.delay_spread(&delays, &solved)?;
+        let covariance = system.covariance(&delays, &solved)?;
         let base = system.base_values(&solved);
         let checked = if check.is_empty() {
             Vec::new()
@@ -163,10 +168,13 @@ impl ServoModel {
             self.equations.host().note(note);
         }
         notes.extend(fit.iter().flat_map(|one| one.run.notes.iter().cloned()));
+        let samples = system.samples.iter().map(|one| one.segment.samples()).sum();
+        let parameters = system.parameters(&solved, &covariance, &base);
         Ok(ServoIdentification {
             model: self.equations.name.clone(),
-            samples: system.samples.iter().map(|one| one.segment.samples()).sum(),
-            parameters: system.parameters(&solved, &spread, &base),
+            samples,
+            model_fit: self.model_fit(&parameters, &covariance, samples),
+            parameters,
             scaled_condition_number: Some(solved.solution.scaled_condition_number).filter(|c| c.is_finite()),
             fit: fitted,
             check: checked,
@@ -451,26 +459,31 @@ impl<'a> ServoSystem<'a> {
         values
     }
 
-    /// Additional variance of the unknowns from the uncertainty of each delay: the change of the solution over one
-    /// standard deviation of the delay.
-    fn delay_spread(&self, delays: &[ServoDelay], solved: &ServoSolution) -> Outcome<Vec<f64>> {
-        let mut variance = vec![0.0; self.unknown.len()];
+    /// Covariance of all base parameters, zero for fixed ones: that of the solution, and for each delay the change of the
+    /// solution over one standard deviation of the delay.
+    fn covariance(&self, delays: &[ServoDelay], solved: &ServoSolution) -> Outcome<DMatrix<f64>> {
+        let n = self.unknown.len();
+        let mut of_unknown = solved.uncertainty.covariance.view((0, 0), (n, n)).clone_owned();
         for (i, delay) in delays.iter().enumerate().filter(|(_, delay)| delay.std > 0.0) {
             let mut moved: Vec<f64> = delays.iter().map(|one| one.value).collect();
             moved[i] += delay.std;
             let other = self.solve(&moved)?;
-            for (slot, (a, b)) in variance
-                .iter_mut()
-                .zip(other.solution.values.iter().zip(&solved.solution.values))
-            {
-                *slot += (a - b).powi(2);
+            let changes = other.solution.values.iter().zip(&solved.solution.values);
+            let change = DVector::from_iterator(n, changes.map(|(a, b)| a - b));
+            of_unknown += &change * change.transpose();
+        }
+        let n_base = self.servo.equations.base.len();
+        let mut covariance = DMatrix::zeros(n_base, n_base);
+        for (i, a) in self.unknown.iter().enumerate() {
+            for (j, b) in self.unknown.iter().enumerate() {
+                covariance[(*a, *b)] = of_unknown[(i, j)];
             }
         }
-        Ok(variance)
+        Ok(covariance)
     }
 
     /// The base parameters with their meaning.
-    fn parameters(&self, solved: &ServoSolution, spread: &[f64], base: &[f64]) -> Vec<ServoParameter> {
+    fn parameters(&self, solved: &ServoSolution, covariance: &DMatrix<f64>, base: &[f64]) -> Vec<ServoParameter> {
         let model = &self.servo.equations;
         let infos = model.parameter_infos();
         (infos.iter().enumerate())
@@ -482,7 +495,7 @@ impl<'a> ServoSystem<'a> {
                     .iter()
                     .find(|freedom| freedom.base.contains(&k));
                 let at = self.unknown.iter().position(|one| *one == k);
-                let std = at.map(|at| solved.uncertainty.std[at].hypot(spread[at].sqrt()));
+                let std = at.map(|at| solved.uncertainty.std[at].max(covariance[(k, k)].sqrt()));
                 let status = match (at, freedom) {
                     (None, Some(_)) => ServoStatus::Reference,
                     (None, None) => ServoStatus::Known,

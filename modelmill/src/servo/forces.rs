@@ -19,6 +19,7 @@ use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
+use super::simulated::SimulatedActuator;
 use super::suspects::{ServoLimit, servo_limits};
 use super::thresholds::{CERTAIN_LIMIT_SHARE, DELAY_STEP, FEWEST_DECIMATED};
 use super::turns::{turn_offset, turn_sentence};
@@ -48,6 +49,49 @@ impl Model {
         let read = |paths: &Vec<&Path>| self.read_recording(paths, reading);
         let read = runs.map(|runs| runs.iter().map(read).collect());
         self.prepare_together(self.add_actuator_forces(read))
+    }
+
+    /// As [`Model::prepare_recordings_with_signals`], with the forces of all actuators computed from their signals, also
+    /// where the recording has measured forces.
+    ///
+    /// A recording that lacks the signals becomes an error, and so does each if the model has no actuators.
+    pub fn prepare_recordings_from_signals(
+        &self,
+        runs: [&[Vec<&Path>]; 2],
+        reading: &RecordingOptions,
+    ) -> [Vec<Outcome<PreparedRecording>>; 2] {
+        let read = |paths: &Vec<&Path>| self.without_measured_forces(self.read_recording(paths, reading)?);
+        let read = runs.map(|runs| runs.iter().map(read).collect());
+        self.prepare_together(self.add_actuator_forces(read))
+    }
+
+    /// A recording without the measured forces of drives with actuators.
+    ///
+    /// Fails when the model has no actuators, or the recording lacks their signals.
+    fn without_measured_forces(&self, recording: UnpreparedRecording) -> Outcome<UnpreparedRecording> {
+        let mechanism = &self.derivation.mechanism;
+        if mechanism.actuators.is_empty() {
+            return Err(Error::input(format!(
+                "{}: the model has no `[[actuator]]`, so that no force follows from a command or another signal; add the actuators \
+                 of the drives, or use a recording of forces",
+                self.path
+            )));
+        }
+        let lacking = mechanism.actuators.iter().map(|one| one.signal.as_str());
+        let lacking: Vec<&str> = lacking.filter(|signal| !recording.raw().has_column(signal)).collect();
+        if !lacking.is_empty() {
+            return Err(Error::input(format!(
+                "{} has no column for {}, the signals of the actuators of {}; name their columns in [recording.columns]",
+                recording.raw().file(),
+                lacking.join(", "),
+                self.path
+            )));
+        }
+        let mut raw = recording.raw().clone();
+        for actuator in &mechanism.actuators {
+            raw.remove_column(&mechanism.drives[actuator.drive.0].name);
+        }
+        Ok(recording.with_signals(raw))
     }
 
     /// Adds the forces of actuators to recordings that lack the forces of their drives: those of a fit, and those of its
@@ -316,6 +360,7 @@ impl<'a> ActuatorForces<'a> {
         let mut computed = ComputedForces {
             time: time.clone(),
             delays: Vec::new(),
+            actuators: Vec::new(),
         };
         for drive in self.model.drives_to_compute(&raw) {
             let position = match mechanism.drives[drive].kind {
@@ -357,6 +402,10 @@ impl<'a> ActuatorForces<'a> {
                     is_commanded: actuator.kind.is_commanded(),
                     values: slopes.collect(),
                 });
+                let delayed = |column: &[f64], times: &[f64]| interpolate(times, column, &time, delay.value);
+                let signals = [delayed(&signal, &time), delayed(&motion.signal_rates[k], &motion.time)];
+                let simulated = SimulatedActuator::new(self.model, actuator, &self.gains, signals);
+                computed.actuators.push(simulated);
                 phrases.push(self.phrase(actuator, delay));
             }
             let name = &mechanism.drives[drive].name;
@@ -565,22 +614,21 @@ impl SmoothMotion {
 /// A column at some times less a delay: between its samples the cubic polynomial through the four nearest, and constant
 /// beyond its ends. A line would cut the curves of a command: at 200 Hz and 4 Hz by more than the noise of an encoder.
 fn interpolate(time: &[f64], column: &[f64], times: &[f64], delay: f64) -> Vec<f64> {
+    times.iter().map(|t| interpolate_at(time, column, t - delay)).collect()
+}
+
+/// A column at one time, as [`interpolate`] computes it.
+pub(super) fn interpolate_at(time: &[f64], column: &[f64], t: f64) -> f64 {
     let last = time.len().saturating_sub(1);
-    times
-        .iter()
-        .map(|t| {
-            let t = t - delay;
-            if last == 0 || t <= time[0] {
-                return column.first().copied().unwrap_or(0.0);
-            }
-            if t >= time[last] {
-                return column[last];
-            }
-            let b = time.partition_point(|x| *x < t).clamp(1, last);
-            let nearest = b.saturating_sub(2)..(b + 2).min(last + 1);
-            lagrange(&time[nearest.clone()], &column[nearest], t)
-        })
-        .collect()
+    if last == 0 || t <= time[0] {
+        return column.first().copied().unwrap_or(0.0);
+    }
+    if t >= time[last] {
+        return column[last];
+    }
+    let b = time.partition_point(|x| *x < t).clamp(1, last);
+    let nearest = b.saturating_sub(2)..(b + 2).min(last + 1);
+    lagrange(&time[nearest.clone()], &column[nearest], t)
 }
 
 /// The polynomial through some points at a time. Points with equal times are no polynomial: the first value counts.

@@ -17,7 +17,7 @@ use crate::recording::PreparedRecording;
 use crate::text::table::number;
 
 /// A product of parameters with their powers, as it stands in a term of an actuator.
-type GainProduct = Vec<(usize, u32)>;
+pub(super) type GainProduct = Vec<(usize, u32)>;
 
 /// Values of the gains of all actuators.
 pub(super) struct GainValues {
@@ -32,20 +32,15 @@ impl GainValues {
     ///
     /// Fails when a gain has no nominal value, and the recordings determine only ratios.
     pub(super) fn new(model: &Model, servo: &ServoModel, fit: &[&PreparedRecording]) -> Outcome<Self> {
-        let mechanism = &model.derivation.mechanism;
+        // A fit changes these nominal values, and no derivation.
+        let mechanism = &model.loaded.mechanism;
         let mut all = Self {
             values: BTreeMap::new(),
             identified: Vec::new(),
         };
         for term in mechanism.actuators.iter().flat_map(|actuator| &actuator.terms) {
             let product = product_of(term);
-            let has_nominal = product.iter().all(|(p, _)| mechanism.parameters[*p].has_nominal);
-            if has_nominal {
-                let value = product.iter().map(|(p, power)| {
-                    let power = i32::try_from(*power).unwrap_or(i32::MAX);
-                    mechanism.parameters[*p].nominal.powi(power)
-                });
-                let value = value.product();
+            if let Some(value) = nominal_value(mechanism, &product) {
                 all.values.insert(product, value);
             } else if !all.identified.contains(&product) {
                 all.identified.push(product);
@@ -144,7 +139,7 @@ impl GainValues {
 }
 
 /// The base parameter whose column is that of a product; `None` if it depends on others.
-fn retaining(servo: &ServoModel, product: &GainProduct) -> Option<usize> {
+pub(super) fn retaining(servo: &ServoModel, product: &GainProduct) -> Option<usize> {
     (0..servo.equations.base.len()).find(|k| {
         let products = servo.equations.products_of(*k);
         products.first().is_some_and(|(first, _)| first.0 == *product)
@@ -168,8 +163,18 @@ fn fixing_clause(servo: &ServoModel, base: usize) -> String {
     }
 }
 
+/// The nominal value of a product; `None` if a parameter has none.
+pub(super) fn nominal_value(mechanism: &Mechanism, product: &GainProduct) -> Option<f64> {
+    let factor = |(p, power): &(usize, u32)| {
+        let parameter = &mechanism.parameters[*p];
+        let power = i32::try_from(*power).unwrap_or(i32::MAX);
+        parameter.has_nominal.then(|| parameter.nominal.powi(power))
+    };
+    product.iter().map(factor).product()
+}
+
 /// The parameters of a term.
-fn product_of(term: &ActuatorTerm) -> GainProduct {
+pub(super) fn product_of(term: &ActuatorTerm) -> GainProduct {
     term.parameters.iter().map(|(p, power)| (p.0, *power)).collect()
 }
 

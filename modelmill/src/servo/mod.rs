@@ -14,9 +14,11 @@ mod estimate;
 mod forces;
 mod gains;
 mod instruments;
+mod model_fit;
 mod refine;
 mod rows;
 mod scale;
+pub(crate) mod simulated;
 mod suspects;
 mod thresholds;
 mod turns;
@@ -38,6 +40,8 @@ pub struct ServoModel {
     /// Groups of base parameters of which only ratios can be identified without a measured force; empty if all values
     /// can be identified.
     pub scale: ServoScale,
+    /// The model without the forces of its actuators.
+    model: Model,
 }
 
 impl Model {
@@ -72,7 +76,11 @@ impl Model {
         let mut equations = self.host().derive(&self.path, loaded)?;
         equations.name.clone_from(&self.name);
         let scale = ServoScale::new(&equations)?;
-        Ok(ServoModel { equations, scale })
+        Ok(ServoModel {
+            equations,
+            scale,
+            model: self.clone(),
+        })
     }
 }
 

@@ -28,6 +28,26 @@ pub(super) fn drive_error_cause(findings: &DiagnosisFindings, recording: &str, d
     Message::join(causes, "; ")
 }
 
+/// The cause of a position error along a recording, which each drive may have.
+pub(super) fn position_error_cause(findings: &DiagnosisFindings, recording: &str) -> Message {
+    let mut causes = fault_causes(findings, Some(recording));
+    // Nothing else is known while a fault cannot be corrected.
+    if findings.unresolved.is_empty() {
+        causes.extend(effect_causes(findings, ""));
+        causes.extend(nominal_causes(findings));
+        causes.extend(parameter_causes(findings));
+        for drive in findings.channels() {
+            causes.extend(disturbance_causes(findings, recording, drive));
+        }
+        if causes.is_empty() {
+            let says = "the diagnosis of the forces found no cause; small errors of the forces add up, and the state at the start \
+                        has an error of its own";
+            causes.push(says.into());
+        }
+    }
+    Message::join(causes, "; ")
+}
+
 /// The cause of an estimate that differs from the model.
 pub(super) fn parameter_cause(findings: &DiagnosisFindings) -> Message {
     let mut causes = fault_causes(findings, None);

@@ -39,6 +39,8 @@ pub enum CheckScope {
     Recording,
     /// A drive along one recording: is the error of the model small enough?
     Drive,
+    /// A position of the model simulated from recorded states: is its error small enough?
+    Position,
     /// A base parameter: does its estimate agree with the model or with an interval?
     Parameter,
     /// The model: does it lack an effect?
@@ -47,13 +49,20 @@ pub enum CheckScope {
 
 impl CheckScope {
     /// All scopes, in the order of the output.
-    pub const ALL: [Self; 4] = [Self::Recording, Self::Drive, Self::Parameter, Self::Effect];
+    pub const ALL: [Self; 5] = [
+        Self::Recording,
+        Self::Drive,
+        Self::Position,
+        Self::Parameter,
+        Self::Effect,
+    ];
 
     /// Its name in JSON and JUnit files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Recording => "recording",
             Self::Drive => "drive",
+            Self::Position => "position",
             Self::Parameter => "parameter",
             Self::Effect => "effect",
         }
@@ -67,9 +76,10 @@ pub struct VerificationCheck {
     pub scope: CheckScope,
     /// The recording; `None` if the check is about all recordings together.
     pub recording: Option<String>,
-    /// The drive, the base parameter, the effect with its places, or the recording.
+    /// The drive, the coordinate, the base parameter, the effect with its places, or the recording.
     pub at: String,
-    /// The quantity that is checked: `error_percent`, `error`, `value`, `probability` or `fault`.
+    /// The quantity that is checked: `error_percent`, `error`, `position_error`, `value`, `probability` or
+    /// `fault`.
     pub quantity: &'static str,
     /// The result.
     pub state: CheckState,

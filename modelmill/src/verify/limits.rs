@@ -18,6 +18,10 @@ pub struct VerificationLimits {
     pub all_drives: DriveErrorLimit,
     /// Limits of the errors of single drives, by name.
     pub drives: Vec<(String, DriveErrorLimit)>,
+    /// Limits of the position errors of all coordinates that have no limit of their own.
+    pub all_positions: PositionErrorLimit,
+    /// Limits of the position errors of single coordinates, by name.
+    pub positions: Vec<(String, PositionErrorLimit)>,
     /// Intervals for estimates of base parameters, by name or expression.
     pub parameters: Vec<(String, [f64; 2])>,
     /// Probability above which a new effect is a failure.
@@ -33,6 +37,15 @@ pub struct DriveErrorLimit {
     pub percent: Option<f64>,
     /// Largest accepted rms error, N or N m.
     pub rms: Option<f64>,
+}
+
+/// Limit of the position error of a coordinate when the model is simulated from recorded states.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PositionErrorLimit {
+    /// Largest accepted rms error, rad or m; `None` for no check.
+    pub rms: Option<f64>,
+    /// Time of each simulation, s; 1 s if none is given.
+    pub horizon: Option<f64>,
 }
 
 impl DriveErrorLimit {
@@ -83,11 +96,14 @@ impl VerificationLimits {
             match name {
                 "all_drives" => limits.all_drives = drive_limit(&place, value.get_ref(), at)?,
                 "drives" => limits.read_drives(model, &place, value.get_ref(), at)?,
+                "all_positions" => limits.all_positions = position_limit(&place, value.get_ref(), at)?,
+                "positions" => limits.read_positions(model, &place, value.get_ref(), at)?,
                 "parameters" => limits.read_parameters(model, &place, value.get_ref(), at)?,
                 "effects" => limits.read_effects(&place, value.get_ref(), at)?,
                 other => {
                     let says = format!(
-                        "unknown entry `{other}`; the tables are [all_drives], [drives.NAME], [parameters] and [effects]"
+                        "unknown entry `{other}`; the tables are [all_drives], [drives.NAME], [all_positions], [positions.NAME], \
+                         [parameters] and [effects]"
                     );
                     return Err(place.error(key.span().start, &says));
                 }
@@ -101,6 +117,16 @@ impl VerificationLimits {
         let own = self.drives.iter().find(|(drive, _)| drive == name);
         let own = own.map_or_else(DriveErrorLimit::default, |(_, limit)| *limit);
         if own.is_empty() { self.all_drives } else { own }
+    }
+
+    /// The limit of a coordinate: its own entries, and those of all positions for the others.
+    pub fn position(&self, name: &str) -> PositionErrorLimit {
+        let own = self.positions.iter().find(|(coordinate, _)| coordinate == name);
+        let own = own.map_or_else(PositionErrorLimit::default, |(_, limit)| *limit);
+        PositionErrorLimit {
+            rms: own.rms.or(self.all_positions.rms),
+            horizon: own.horizon.or(self.all_positions.horizon),
+        }
     }
 
     /// The interval of a base parameter, by its name or expression.
@@ -126,6 +152,25 @@ impl VerificationLimits {
             }
             let limit = drive_limit(place, value.get_ref(), value.span().start)?;
             self.drives.push((name.to_owned(), limit));
+        }
+        Ok(())
+    }
+
+    /// Reads the table `positions`.
+    fn read_positions(&mut self, model: &Model, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
+        let coordinates = model.active_coordinates();
+        for (key, value) in place.table(value, at, "positions")? {
+            let name = key.get_ref().as_ref();
+            if !coordinates.iter().any(|coordinate| coordinate == name) {
+                let says = format!(
+                    "{} has no independent coordinate `{name}`; its independent coordinates are {}",
+                    model.path,
+                    coordinates.join(", ")
+                );
+                return Err(place.error(key.span().start, &says));
+            }
+            let limit = position_limit(place, value.get_ref(), value.span().start)?;
+            self.positions.push((name.to_owned(), limit));
         }
         Ok(())
     }
@@ -197,8 +242,7 @@ const ACCEPTED: &str = "`accepted` is a list of effects, such as [\"coulomb_fric
 fn drive_limit(place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome<DriveErrorLimit> {
     let mut limit = DriveErrorLimit::default();
     for (key, value) in place.table(value, at, "limits of a drive")? {
-        let name = key.get_ref().as_ref();
-        let slot = match name {
+        let slot = match key.get_ref().as_ref() {
             "error_percent" => &mut limit.percent,
             "error" => &mut limit.rms,
             other => {
@@ -209,17 +253,45 @@ fn drive_limit(place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcom
                 return Err(place.error(key.span().start, &says));
             }
         };
-        match number(value.get_ref()) {
-            Some(number) if number > 0.0 && number.is_finite() => *slot = Some(number),
-            _ => {
-                return Err(place.error(
-                    value.span().start,
-                    &format!("`{name}` is a number above 0, such as 5.0"),
-                ));
-            }
-        }
+        *slot = Some(positive_number(
+            place,
+            key.get_ref(),
+            value.get_ref(),
+            value.span().start,
+        )?);
     }
     Ok(limit)
+}
+
+/// Reads the limit of a position.
+fn position_limit(place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome<PositionErrorLimit> {
+    let mut limit = PositionErrorLimit::default();
+    for (key, value) in place.table(value, at, "limit of a position")? {
+        let slot = match key.get_ref().as_ref() {
+            "error" => &mut limit.rms,
+            "horizon" => &mut limit.horizon,
+            other => {
+                let says = format!(
+                    "there is no limit `{other}` of a position; use `error` (rms error in rad or m) and `horizon` (time of each \
+                     simulation in s)"
+                );
+                return Err(place.error(key.span().start, &says));
+            }
+        };
+        *slot = Some(positive_number(
+            place,
+            key.get_ref(),
+            value.get_ref(),
+            value.span().start,
+        )?);
+    }
+    Ok(limit)
+}
+
+/// A number above zero.
+fn positive_number(place: &LimitsText<'_>, name: &str, value: &DeValue<'_>, at: usize) -> Outcome<f64> {
+    let found = number(value).filter(|number| *number > 0.0 && number.is_finite());
+    found.ok_or_else(|| place.error(at, &format!("`{name}` is a number above 0, such as 5.0")))
 }
 
 /// A number of the file.

@@ -1,8 +1,8 @@
 //! `verify`: tests a model against recordings. A model, recordings and limits go in; checks with the results
 //! pass, fail and not evaluated come out, each failure with its cause from the diagnosis.
 //!
-//! The modules, in the order of the data flow: `limits` reads limits, `recordings`, `drives`, `parameters` and
-//! `effects` make the checks of their scopes, `causes` explains failures, `fingerprints` states which files were
+//! The modules, in the order of the data flow: `limits` reads limits, `recordings`, `drives`, `positions`,
+//! `parameters` and `effects` make the checks of their scopes, `causes` explains failures, `fingerprints` states which files were
 //! used.
 
 mod causes;
@@ -13,6 +13,7 @@ mod effects;
 mod fingerprints;
 mod limits;
 mod parameters;
+mod positions;
 mod recordings;
 pub(crate) mod thresholds;
 
@@ -24,13 +25,13 @@ use crate::recording::PreparedRecording;
 pub use checks::{CheckScope, CheckState, VerificationCheck};
 pub use digest::hash_file;
 pub use fingerprints::{FileFingerprint, FileRole};
-pub use limits::{DriveErrorLimit, VerificationLimits};
+pub use limits::{DriveErrorLimit, PositionErrorLimit, VerificationLimits};
 
 /// The result of a verification, which [`Model::verify`] returns.
 pub struct ModelVerification {
     /// Name of the model.
     pub model: String,
-    /// All checks, by scope: recordings, drives, parameters, effects.
+    /// All checks, by scope: recordings, drives, positions, parameters, effects.
     pub checks: Vec<VerificationCheck>,
     /// The limits that were used.
     pub limits: VerificationLimits,
@@ -67,6 +68,9 @@ impl Model {
         for one in recordings {
             checks.extend(drives::check_drives(self, one, limits, findings.ok())?);
         }
+        for one in recordings {
+            checks.extend(positions::check_positions(self, one, limits, findings.ok())?);
+        }
         checks.extend(parameters::check_parameters(self, recordings, limits, findings)?);
         checks.extend(effects::check_effects(limits, findings));
         Ok(ModelVerification {
@@ -79,13 +83,14 @@ impl Model {
 }
 
 impl ModelVerification {
-    /// The result. Fail: at least one check fails. Pass: no check fails, the error of at least one drive passes, and all
+    /// The result. Fail: at least one check fails. Pass: no check fails, that of at least one drive or position passes, and all
     /// checks with a limit of the user are evaluated. Otherwise: not evaluated.
     pub fn state(&self) -> CheckState {
         let count = |state: CheckState| self.count(state);
         let is_open = |one: &VerificationCheck| !one.is_default && one.state == CheckState::NotEvaluated;
         // The state of recordings says nothing about the model.
-        let passes = |one: &VerificationCheck| one.scope == CheckScope::Drive && one.state == CheckState::Pass;
+        let is_of_model = |one: &VerificationCheck| [CheckScope::Drive, CheckScope::Position].contains(&one.scope);
+        let passes = |one: &VerificationCheck| is_of_model(one) && one.state == CheckState::Pass;
         if count(CheckState::Fail) > 0 {
             CheckState::Fail
         } else if self.checks.iter().any(is_open) || !self.checks.iter().any(passes) {

@@ -17,6 +17,7 @@ mod runs;
 mod runs_verdict;
 mod servo;
 mod servo_diagnosis;
+mod servo_use;
 mod spoilt;
 mod stick;
 mod together;
