@@ -1,4 +1,5 @@
-//! Edits of a model file: an effect is added to its text, and everything else stays as it is, byte for byte.
+//! Edits of the text of a model file: an effect is inserted, and everything else stays as it is, byte for byte. Nothing
+//! is derived here; the module `add` of the library `modelmill` uses these edits and returns a model.
 //!
 //! A text and a [`NewEffect`] go in, the new text comes out. The table is inserted behind the last effect, or at the
 //! end of a file without effects. An inline list of effects gets one more entry.

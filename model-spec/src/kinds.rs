@@ -169,7 +169,7 @@ pub enum ConstantSearch {
     },
 }
 
-/// A kind of effect, as messages, pages and searches use it.
+/// Description of a kind of effect: name, texts, parameters, places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectKind {
     /// Name of the kind.

@@ -75,7 +75,8 @@ pub use toml_budget::{TomlExcess, find_toml_excess};
 pub use unit::unit_product;
 pub use values::is_reserved_word;
 
-/// The JSON Schema of model files, by which editors complete and explain them; a test keeps it true.
+/// The JSON Schema of model files, by which editors complete and explain them; a test checks that it
+/// agrees with the reader.
 pub const SCHEMA: &str = include_str!("../schema/modelmill.schema.json");
 
 #[cfg(any(test, feature = "schema"))]

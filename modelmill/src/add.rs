@@ -1,4 +1,5 @@
-//! `add`: adds effects to a model file, which keeps its comments and layout.
+//! `add`: a [`Model`] with effects added, derived again. Its file keeps comments and layout; the edit of the text is
+//! that of [`crate::edit`], which works without a derived model.
 
 use modelmill_spec::EffectKind;
 use modelmill_spec::edit::{NewEffect, NewParameter};

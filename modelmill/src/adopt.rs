@@ -25,7 +25,8 @@ pub struct FitAdoption {
 
 impl Model {
     /// Writes the values of a fit into the text of the model's file, in place of those of an earlier fit; everything
-    /// else stays as it is, byte for byte. `file` is the name of the fit in messages.
+    /// else stays as it is, byte for byte. `file` is only used as the name of the fit: in messages, and in a comment of
+    /// the text.
     ///
     /// Fails if the fit belongs to another model.
     ///

@@ -1,5 +1,5 @@
-//! A model along a recording: its forces and reactions, the measured forces, and variables on which an error may
-//! depend.
+//! A model evaluated at all samples of a recording: its forces and reactions, the measured forces, and variables on
+//! which an error may depend.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms};
 use modelmill_identify::{DECIMATION_PASSBAND, decimate_columns};

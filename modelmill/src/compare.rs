@@ -24,10 +24,10 @@ pub struct ModelComparison {
     /// Error metrics, over all drives and for each drive.
     pub figures: ErrorFigures,
     /// Ranges of variables in which the error is large.
-    pub places: ErrorLocations,
+    pub error_locations: ErrorLocations,
     /// Notes on the recordings.
     pub notes: Vec<RecordingNote>,
-    /// The suspected fault of the first recording that has one: until it is corrected, all figures are doubtful.
+    /// The suspected mistake of the first recording that has one: until it is corrected, all figures are doubtful.
     pub suspect: Option<SuspectedFault>,
 }
 
@@ -52,7 +52,7 @@ impl Model {
             model: self.name.clone(),
             files: data.iter().map(|one| one.run.file.clone()).collect(),
             figures,
-            places: error_locations(self, &data, &measured, &forces)?,
+            error_locations: error_locations(self, &data, &measured, &forces)?,
             suspect: first_suspect(recordings),
             notes: {
                 let notes = data.iter().flat_map(RecordingSegment::notes).cloned();
@@ -62,7 +62,7 @@ impl Model {
     }
 }
 
-/// The suspected fault of the first of some recordings that has one.
+/// The suspected mistake of the first of some recordings that has one.
 pub(crate) fn first_suspect(recordings: &[&PreparedRecording]) -> Option<SuspectedFault> {
     recordings.iter().find_map(|one| one.suspected_fault()).cloned()
 }

@@ -32,11 +32,11 @@ pub fn description(path: &str, loaded: &LoadedModel, format: Format) -> Outcome<
 }
 
 impl Model {
-    /// Writes the model as a URDF or MJCF, with its nominal values or with the physical parameters of a fit. `fit` is
-    /// given with its name in messages.
+    /// Writes the model as a URDF or MJCF, with its nominal values or with the physical parameters of a fit. The text
+    /// in `fit` is only used in messages, as the name of the fit.
     ///
-    /// Fails when a fit has base parameters only, since these do not determine single bodies, and as [`description`]
-    /// does.
+    /// Fails when a fit has base parameters only, since these do not determine single bodies; also in all cases in
+    /// which [`description`] fails.
     pub fn export(&self, format: Format, fit: Option<(&FitFile, &str)>) -> Outcome<ExportedRobot> {
         let Some((fit, file)) = fit else {
             return description(&self.path, &self.loaded, format);

@@ -29,7 +29,8 @@ pub struct InterpretationResult {
 
 impl Model {
     /// Solves identified base parameters for physical ones, with the others fixed at their nominal values: all real
-    /// solutions, as in Table 1 of the paper. `file` is the name of the fit in messages.
+    /// solutions, as in Table 1 of the paper. `file` is only used in messages,
+    /// as the name of the fit.
     ///
     /// Fails when a name is not a parameter of the model, when the fit belongs to another model, or when the
     /// equations are too many for an exact solution.
@@ -179,7 +180,7 @@ impl InterpretationResult {
 
     /// The reason why a value has the wrong sign; `None` if its sign is possible. `i` counts the unknown parameters.
     pub(crate) fn sign_violation(&self, i: usize, value: f64) -> Option<&'static str> {
-        match self.model.sign_of(self.unknown[i]) {
+        match self.model.sign_of_parameter(self.unknown[i]) {
             Sign::Positive if value < 0.0 => Some("must not be negative"),
             Sign::Negative if value > 0.0 => Some("must not be positive"),
             _ => None,

@@ -26,8 +26,8 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
-//! // Each regressor column belongs to one product of parameters. As many columns as are linearly independent are kept;
-//! // `retained` is the product of a kept column.
+//! // Each regressor column belongs to one product of parameters. A largest set of linearly independent columns is
+//! // kept; `retained` is the product of a kept column.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
@@ -71,7 +71,7 @@
 //! | [`report::page`] | a diagnosis as one page |
 //! | [`Host::simulate`] | simulation of a rig (a numeric model of the complete machine, used in place of hardware) along a trajectory |
 //! | [`Host::reduce`] | the reduction of a rig to a planar model |
-//! | [`Host::propose_plan`] | a plan for this reduction |
+//! | [`Host::propose_plan`] | a plan file for this reduction: the plane, and the bodies that are merged into one part |
 //! | [`Host::check_rig`] | the contents of a rig, and whether its loops close |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |

@@ -58,7 +58,7 @@ pub struct RigReduction {
     pub n_base: usize,
 }
 
-/// A plan that was proposed for a rig, with the model that it makes.
+/// A plan that was proposed for a rig, with the planar model to which it leads.
 pub struct ProposedReduction {
     /// The text of the plan file.
     pub plan: String,
@@ -103,9 +103,10 @@ impl Host {
         self.compare_reduction(rig, reduction)
     }
 
-    /// Proposes a plan for a rig whose bodies move in one plane: bodies that move alike become one part, bodies that only
-    /// translate become point masses, and equal values share a symbol. The plan is carried out, so that its
-    /// error is known.
+    /// Proposes a plan file for a rig whose bodies move in one plane. The plan states the plane, the bodies that are
+    /// merged into one part, and the symbols of their values. Bodies that move alike become one part, bodies that only
+    /// translate become point masses, and equal values share a symbol. The rig is reduced by this plan, so that the
+    /// error of the plan is known.
     ///
     /// Fails with the errors of the rig, and when no plan can be proposed for it.
     ///

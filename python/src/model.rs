@@ -297,7 +297,7 @@ impl CoreModel {
     /// Remarks on missing nominal values.
     #[getter]
     fn nominal_notes(&self) -> RemarkList {
-        remarks(&self.model.nominal_values().notes)
+        remarks(&self.model.base_parameter_values().notes)
     }
 
     /// The equations as text in a format.

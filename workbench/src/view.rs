@@ -17,7 +17,7 @@ pub(crate) fn derivation_view(found: &Result<Model, Error>, path: &str, wording:
         Ok(model) => json!({
             "valid": true,
             "diagnostics": print::warnings(&model.loaded, wording),
-            "notes": model.notes.iter().chain(&model.nominal_values().notes).map(|note| note.json(wording)).collect::<Vec<_>>(),
+            "notes": model.notes.iter().chain(&model.base_parameter_values().notes).map(|note| note.json(wording)).collect::<Vec<_>>(),
         }),
         Err(Error::Model(faults)) => print::faults(faults, wording),
         Err(error) => print::refusal(&error.format_for(wording), path),

@@ -46,7 +46,7 @@ impl ParameterSource {
     /// Values with their origin, for [`Self::values`] and [`Self::apply_to`]. Prints the remarks.
     fn load_values(&self, host: &Host, model: &Model) -> CommandOutcome<BaseParameterValues> {
         let values = match self {
-            Self::Nominal => model.nominal_values(),
+            Self::Nominal => model.base_parameter_values(),
             Self::Fit(path) => {
                 let fit = host.fit(path)?;
                 model.values_of(&fit, &path.display().to_string())?

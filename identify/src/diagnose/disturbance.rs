@@ -1,4 +1,5 @@
-//! Disturbances of recordings, which are no part of the model, and the origin of the residual of each channel.
+//! Disturbances of recordings, which are no part of the model, and the origin of the residual of each channel. A
+//! channel is the force signal of one drive.
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::in_time::{ChangeInterval, TimeResidual, time_residual};
@@ -35,7 +36,9 @@ impl EstimatedQuantity {
     }
 }
 
-/// A fault of a recording.
+/// A disturbance that was found in a recording: an error of its signals, such as drift or outliers, or a change of the
+/// machine, such as a contact or another payload. It is not a missing effect. Suspected mistakes of the recording, such
+/// as exchanged columns, are listed as disturbances too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disturbance {
     /// Name of the kind in JSON and in scripts.

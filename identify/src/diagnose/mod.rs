@@ -65,7 +65,7 @@ mod thresholds;
 mod tile;
 mod tilt;
 mod tuning;
-mod undetermined;
+mod undecided;
 mod zero_columns;
 
 use serde::Serialize;
@@ -113,13 +113,13 @@ pub enum DiagnosisVerdict {
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
     /// A part of the residual remains that no candidate explains: it is repeatable, or it varies with time. The verdict is
-    /// the same if the recordings agree with the model only after the correction of a fault, or if noise of half the force
-    /// or more hides what may be missing.
+    /// the same if the recordings agree with the model only after the correction of a mistake, or if noise of half the
+    /// force or more hides what may be missing.
     Unexplained,
 }
 
 impl ModelDiagnosis {
-    /// Whether noise is so large that recordings without a finding do not show that the model is adequate.
+    /// True if the noise is so large that a missing effect could stay undetected.
     pub fn is_hidden_by_noise(&self) -> bool {
         self.noise_floor >= HIDING_NOISE_SHARE
     }
@@ -184,12 +184,14 @@ pub struct CandidateOutcome {
     pub rejection_reason: Option<RejectionReason>,
 }
 
-/// Result of a diagnosis.
+/// Result of the search inside a diagnosis. Drives are indices here: a channel is the force signal of one drive. The
+/// library `modelmill` returns it in its `DiagnosisFindings`, which adds the names of the drives, the models without
+/// and with the effects, and the edited model file.
 #[derive(Clone, Debug)]
 pub struct ModelDiagnosis {
     /// The verdict.
     pub verdict: DiagnosisVerdict,
-    /// Noise of all channels, white or coloured, relative to the measured forces (0.01 = 1 %).
+    /// Noise of the forces of all drives together, white or coloured, relative to the measured forces (0.01 = 1 %).
     pub noise_floor: f64,
     /// Residual of each channel, split by its origin.
     pub budgets: Vec<ResidualBudget>,
@@ -207,10 +209,11 @@ pub struct ModelDiagnosis {
     pub candidates: Vec<CandidateOutcome>,
     /// Effects that the recordings can neither show nor exclude. Even if such an effect had a force as large as that of
     /// the drive, the part of it that the other columns cannot reproduce would be too small to detect.
-    pub undetermined_effects: Vec<LocatedEffect>,
-    /// Residual of the last set, `[channel][sample]`, N or N m; samples that are left out are zero.
+    pub undecided_effects: Vec<LocatedEffect>,
+    /// Residual after the last step, `[channel][sample]`, N or N m; 0 at excluded samples.
     pub residual: Vec<Vec<f64>>,
-    /// The same with the samples that are left out, which are not fitted; zero where no force was measured.
+    /// As `residual`, but with the real residual also at the excluded samples, which are not fitted; 0 where no force
+    /// was measured.
     pub complete_residual: Vec<Vec<f64>>,
     /// Share of each channel's squared residual that is repeatable on data that was not fitted, 0 to 1.
     pub repeatable_share: Vec<f64>,
@@ -376,7 +379,7 @@ fn diagnose_cleaned(
             candidate.rejection_reason = Some(RejectionReason::LessLikelyThanNot);
         }
     }
-    let untold = bench.find_undetermined(&picks, &rest);
+    let undecided = bench.find_undecided(&picks, &rest);
     let later = bench.changes_in_residual(&picks);
     let complete_residual = bench.complete_residual(&picks);
     let diagnosis = ModelDiagnosis {
@@ -388,7 +391,7 @@ fn diagnose_cleaned(
         effects,
         possible_effects: possible,
         candidates,
-        undetermined_effects: untold,
+        undecided_effects: undecided,
         residual: rest,
         complete_residual,
         repeatable_share: again,

@@ -210,7 +210,7 @@ pub(super) const SPOILED_LEAST_RISE: f64 = 1.25;
 /// pendulum whose measured torque does not follow its motion.
 pub(super) const LARGE_RESIDUAL_SHARE: f64 = 0.5;
 
-// --- alternatives, probabilities and what is undetermined
+// --- alternatives, probabilities and what is undecided
 
 /// A set is distinguishable from the best one if its criterion is worse by this much (1): twice the logarithm of the
 /// likelihood, with the effective number of samples. By judgement.
@@ -279,21 +279,21 @@ pub(super) const CANCELLING_MOST_SHARE: f64 = 0.5;
 /// By judgement; a cable torque on EMPS with a step of the force has such values (`lab/measured/planted.py`).
 pub(super) const UNCLEAR_MOST_PROBABILITY: f64 = 0.4;
 
-/// Below this probability an effect is possible and does not count as missing by itself (1). By definition.
+/// Below this probability an effect is possible and does not count as missing by itself. By definition.
 pub const LACKING_LEAST_PROBABILITY: f64 = 0.5;
 
 /// A column whose share of squares outside of the others is below this (1) is a combination of them along any motion,
-/// and its effect is not listed as undetermined. Below it is rounding. By judgement.
-pub(super) const UNDETERMINED_LEAST_SHARE: f64 = 1e-18;
+/// and its effect is not listed as undecided. Below it is rounding. By judgement.
+pub(super) const UNDECIDED_LEAST_SHARE: f64 = 1e-18;
 
-/// An effect is undetermined if the squares of a force as large as the drives' own, without what the other columns
+/// An effect is undecided if the squares of a force as large as the drives' own, without what the other columns
 /// explain of it, are below this many variances of the residual (1): the uncertainty of the effect is then larger than
 /// that force. By definition.
-pub(super) const UNDETERMINED_MOST_VARIANCES: f64 = 1.0;
+pub(super) const UNDECIDED_MOST_VARIANCES: f64 = 1.0;
 
 // --- noise
 
-/// Errors below this share of a force (1) are rounding, of the recording or of its simulation. By judgement.
+/// Errors below this share of a force are rounding, of the recording or of its simulation. By judgement.
 pub const FORCE_ROUNDING: f64 = 3e-6;
 
 /// The noise of a residual is coloured if its effective number of samples is at most this share of all samples (1). By

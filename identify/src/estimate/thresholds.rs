@@ -1,9 +1,9 @@
 //! Thresholds of the estimation: numbers that decide what is reported of parameters. Each states what it bounds, its
 //! unit, and how it was chosen. Numbers that only set an accuracy stay where they are used.
 
-/// Singular values of the column-scaled regressor below this fraction of the largest one (1) count as zero. By
-/// judgement: rounding causes about 1e-15; larger values are information, and the standard deviations show how weak it
-/// is.
+/// Singular values of the column-scaled regressor below this fraction of the largest one (dimensionless) count as zero.
+/// By judgement: rounding causes about 1e-15; larger values are information, and the standard deviations show how weak
+/// it is.
 pub const RANK_TOLERANCE: f64 = 1e-11;
 
 /// Columns whose norm is below this fraction of the largest one's (1) are rounding noise and count as zero: scaled to
@@ -17,8 +17,8 @@ pub(super) const PARTICIPATION_TOLERANCE: f64 = 1e-6;
 /// Equations per parameter below which the influences of samples cancel too much to be summed over lags. By judgement.
 pub const FEWEST_ROWS: usize = 20;
 
-/// Huber's bound, in standard deviations (1); residuals beyond it are outliers. Chosen for 95 % efficiency under normal
-/// residuals; the function is that of P. J. Huber, Ann. Math. Statist. 35 (1964).
+/// Huber's bound, in standard deviations (dimensionless); residuals beyond it are outliers. Chosen for 95 % efficiency
+/// under normal residuals; the function is that of P. J. Huber, Ann. Math. Statist. 35 (1964).
 pub const HUBER_BOUND: f64 = 1.345;
 
 /// Parameters whose relative standard deviation is at most this (1) are essential without a test. By judgement.

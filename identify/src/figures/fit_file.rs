@@ -1,4 +1,4 @@
-//! The result of an identification as a file: what `identify --json` prints and `--parameters FIT.json` reads.
+//! A fit as a file: the JSON that `identify --json` prints and `--parameters FIT.json` reads.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -105,7 +105,8 @@ struct SignalFitFile {
     model_fit: Option<FitFile>,
 }
 
-/// An identification: the JSON of `identify`.
+/// A fit read from the JSON file that `identify` writes, or to be written to it: values and standard deviations of all
+/// base parameters, error figures and notes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitFile {
     /// Name of the model.
@@ -250,7 +251,7 @@ impl FitFile {
         Self::parse(&text, &file)
     }
 
-    /// Reads a fit from its text; `file` is its name in messages.
+    /// Reads a fit from its text. `file` is only used in messages, as the name of the fit.
     pub fn parse(text: &str, file: &str) -> Result<Self, FitFileError> {
         if !text.trim_start().starts_with('{') {
             return Err(FitFileError {
@@ -284,7 +285,7 @@ impl FitFile {
     /// Constants of the model that had other values when the fit was computed: `(name, value then, value now)`. `model`
     /// contains `(name, value)`; a fit without constants, from an earlier version, has none that differ.
     /// Fails if such a constant is in an expression of the base parameters, which then are different.
-    /// `file` is the name of the fit in messages.
+    /// `file` is only used in messages, as the name of the fit.
     pub fn differing_constants(
         &self,
         model: &[(&str, f64)],
@@ -314,7 +315,8 @@ impl FitFile {
     }
 
     /// The values for a model's base parameters, `(name, expression)` in the model's order.
-    /// `file` is the name of the fit in messages. Fails if the parameters of the file are not exactly these.
+    /// `file` is only used in messages, as the name of the fit. Fails if the parameters of the file are not exactly
+    /// these.
     pub fn values_for(&self, model: &[(&str, &str)], file: &str) -> Result<Vec<f64>, FitFileError> {
         let fail = |fault| FitFileError {
             file: file.to_owned(),

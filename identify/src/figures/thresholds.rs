@@ -2,7 +2,7 @@
 //! reported. Each states what it bounds, its unit, and how it was chosen. Numbers that only set an accuracy, a grid or
 //! a size stay where they are used.
 
-/// Share of the samples that is dropped at each end of filtered forces (1), where the filter has transients. By
+/// Share of the samples that is dropped at each end of filtered forces, where the filter has transients. By
 /// judgement.
 pub const TRIMMED_PART: f64 = 0.05;
 

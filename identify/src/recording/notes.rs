@@ -15,7 +15,7 @@ pub enum NoteSeverity {
     Warning,
 }
 
-/// One note about a recording or its preparation.
+/// One note about a model file, a recording or its preparation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingNote {
     /// How much it matters.

@@ -11,8 +11,8 @@ use super::findings::{DiagnosisFindings, MissingEffect};
 use super::words;
 
 impl DiagnosisFindings {
-    /// The entries that should be added: none if a suspected fault (exchanged columns, wrong sign, wrong units, wrong
-    /// direction of gravity) could be the cause of the findings.
+    /// The entries that should be added: none if a suspected mistake (exchanged columns, a wrong sign, unit or time
+    /// unit, a wrong direction of gravity) could be the cause of the findings.
     pub fn entries_to_add(&self) -> &[NewEffect] {
         if words::has_suspicion(&self.diagnosis) {
             &[]
@@ -24,8 +24,8 @@ impl DiagnosisFindings {
     /// The text of the completed model file, in which the effects found are added to the given one. It is the given file if
     /// no effect is missing.
     ///
-    /// Fails if a recording or the direction of gravity in the model file has a fault, even if a trial correction was
-    /// made. Fails also if the effects contradict the model file.
+    /// Fails if there is such a suspected mistake, even if a trial correction was made. Fails also if the effects
+    /// contradict the model file.
     pub fn completed_model(&self) -> Outcome<&str> {
         let has_fault = !self.unresolved.is_empty() || !self.corrected.is_empty();
         if has_fault || words::has_suspicion(&self.diagnosis) {
@@ -70,7 +70,7 @@ impl DiagnosisFindings {
             .collect()
     }
 
-    /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
+    /// Advice if not all effects can be added to the model file: because of a suspected mistake, or of a delayed force
     /// signal.
     pub(crate) fn further_action(&self) -> Option<&'static str> {
         if self.missing.is_empty() || words::has_suspicion(&self.diagnosis) {

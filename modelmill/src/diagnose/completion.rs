@@ -8,7 +8,7 @@ use crate::error::Outcome;
 /// The model with the effects that a diagnosis found, or the reason why there is none.
 #[expect(clippy::large_enum_variant, reason = "there is one for each diagnosis")]
 pub enum ModelCompletion {
-    /// No effect was found that a model file can contain, or faults of the recordings are unresolved.
+    /// No effect was found that a model file can contain, or a suspected mistake could not be corrected.
     NothingToAdd,
     /// The model with the effects, identified from the same recordings.
     Added(ModelVersion),

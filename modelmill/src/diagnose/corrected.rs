@@ -252,8 +252,8 @@ fn merge_faults(all: impl Iterator<Item = SuspectedFault>) -> Vec<SuspectedFault
 }
 
 impl DiagnosisFindings {
-    /// The verdict with figures, as sentences. Faults of the recordings come first. If one of them could not be
-    /// corrected, the verdict states nothing else.
+    /// The verdict with figures, as sentences. Suspected mistakes come first. If one of them could not be corrected,
+    /// the verdict states nothing else.
     pub fn verdict_text(&self) -> String {
         let says = if self.unresolved.is_empty() {
             let verdict = words::verdict(&self.diagnosis, self.channels(), self.validation);
@@ -285,7 +285,7 @@ impl DiagnosisFindings {
             diagnosis.verdict = DiagnosisVerdict::Unexplained;
             diagnosis.disturbances.retain(is_recording_fault);
             diagnosis.possible_effects.clear();
-            diagnosis.undetermined_effects.clear();
+            diagnosis.undecided_effects.clear();
             diagnosis.candidates.clear();
             diagnosis.time_residuals.clear();
             diagnosis.unexplained.clear();

@@ -1,6 +1,5 @@
-//! Faults of recordings that are known before the search: contacts, coarse quantisation, and differences
-//! between recordings of the machine. All are reported and subtracted or left out, so that none is mistaken for
-//! an effect.
+//! Disturbances that are known before the search: contacts, coarse quantisation, and differences between recordings of
+//! the machine. All are reported and subtracted or left out, so that none is taken for an effect.
 
 use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, EstimatedQuantity, quantisation_step};
 
@@ -26,8 +25,8 @@ pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) 
     }
 }
 
-/// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances. Returns the samples
-/// that were left out before the contacts were, `[channel][sample]`.
+/// Subtracts known disturbances from the measured forces of a problem, and adds them to its disturbances. Returns the
+/// samples that were left out before the contacts were, `[channel][sample]`.
 ///
 /// Fails when a recording has no forces.
 pub(crate) fn subtract_known(

@@ -30,7 +30,7 @@ use super::elastic_drives::{ElasticAlternative, elastic_alternatives};
 use super::estimates::{EffectEstimate, effect_estimates};
 use super::faults;
 use super::geometry_alternatives::{GeometryAlternative, GeometryError, geometry_alternatives};
-use super::laws::{self, LawHypothesis};
+use super::laws::{self, NamedLawProposal};
 use super::long_recordings;
 use super::model_versions::ModelVersion;
 use super::named_zeros::NamedZeros;
@@ -41,8 +41,8 @@ use super::standing_drives::StandingDrives;
 use super::thresholds::{EQUAL_ALTERNATIVE_LEAST_SHARE, MOST_VALIDATION_ERROR};
 use super::words::{self, ValidationMethod};
 
-/// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit
-/// are worthless then.
+/// Fails if the error of the fitted model on validation data exceeds that of the prediction that all forces are zero:
+/// findings of the fit are worthless then.
 fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Outcome {
     let diagnosis = &answer.diagnosis;
     let last = diagnosis.steps.last();
@@ -53,8 +53,8 @@ fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Out
         return Ok(());
     }
     Err(Error::input(message!(
-        "the error {} is {} of the force ({} on the fitted data), more than that of a model without any force. So the fit is \
-         useless, and no effect can be found. Fit a longer recording in which all drives move far and fast ({}), or fix the \
+        "the error {} is {} of the force ({} on the fitted data), more than that of the prediction that all forces are zero. So the \
+         fit is useless, and no effect can be found. Fit a longer recording in which all drives move far and fast ({}), or fix the \
          parameters at those of an earlier fit ({})",
         judged.phrase(),
         percent(Some(last.check)),
@@ -84,17 +84,18 @@ impl Default for DiagnosisOptions {
     }
 }
 
-/// The findings of a diagnosis, which [`Model::diagnose`] returns.
+/// Result of [`Model::diagnose`]: the result of the search in [`Self::diagnosis`], effects with their alternatives and
+/// experiments, the models without and with the effects found, and the edited model file.
 pub struct DiagnosisFindings {
-    /// Verdict, error after each step of the search, all candidates with the reasons why they were rejected, and the
-    /// residual.
+    /// Result of the search: the verdict, the error after each step, all candidates with the reasons why they were
+    /// rejected, and the residual.
     pub diagnosis: ModelDiagnosis,
     /// The effects found: those that the model lacks.
     pub missing: Vec<MissingEffect>,
     /// Effects with a probability below 0.5. The verdict does not name them, and they are not added to the model.
     pub possible: Vec<MissingEffect>,
-    /// Hypotheses: force laws that are in no library and would explain the residual.
-    pub laws: Vec<LawHypothesis>,
+    /// Proposed force laws, which are in no library and would explain the residual: hypotheses, not findings.
+    pub laws: Vec<NamedLawProposal>,
     /// Effects that the recordings can neither show nor exclude.
     pub undecided: Vec<UndecidedEffect>,
     /// Base parameters of bodies (not of effects) whose estimates differ from their nominal values. The largest
@@ -110,7 +111,7 @@ pub struct DiagnosisFindings {
     pub elastic_alternatives: Vec<ElasticAlternative>,
     /// The regions of large error that text and JSON report: ranges of a coordinate, velocity, load or time. If the
     /// verdict is [`DiagnosisVerdict::Unexplained`], they are regions of the residual of the unexplained drives.
-    /// Otherwise they are the regions in [`Self::places`].
+    /// Otherwise they are the regions in [`Self::error_locations`].
     pub regions: Vec<ErrorRegion>,
     /// The given model, without added effects: its fit, and its forces along all recordings.
     pub before: ModelVersion,
@@ -122,18 +123,18 @@ pub struct DiagnosisFindings {
     pub edited: Option<CompletedModelFile>,
     /// Where the error of the given model (without added effects) is large, whatever the verdict is: ranges of a
     /// coordinate, velocity, load or time. Their share of the squared error is larger than their share of the samples.
-    pub places: ErrorLocations,
+    pub error_locations: ErrorLocations,
     /// Where the error of the model with the effects found is large; `None` if there is no such model.
     pub residual_locations: Option<ErrorLocations>,
     /// The data on which errors are evaluated: validation runs, or cross-validation.
     pub validation: ValidationMethod,
     /// Notes on the model, on the recordings, and on estimates with an impossible sign.
     pub notes: Vec<RecordingNote>,
-    /// Faults of the recordings for which a trial correction was made (in memory). All findings hold for the corrected
-    /// recordings.
+    /// Suspected mistakes, such as exchanged columns, for which a trial correction was made (in memory). All findings
+    /// hold for the corrected recordings.
     pub corrected: Vec<SuspectedFault>,
-    /// Faults that could not be corrected: several explain a recording equally well, or the correction of one fails.
-    /// If there are any, the diagnosis reports no other findings.
+    /// Suspected mistakes that could not be corrected: several explain a recording equally well, or the correction of
+    /// one fails. If there are any, the diagnosis reports no other findings.
     pub unresolved: Vec<SuspectedFault>,
     /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
@@ -193,7 +194,7 @@ pub struct SeparationProposal {
 
 /// A diagnosis with all base parameters fixed at their nominal values.
 pub struct NominalDiagnosis {
-    /// Verdict, error after each step of the search, all candidates, and the residual.
+    /// Result of the search: the verdict, the error after each step, all candidates, and the residual.
     pub diagnosis: ModelDiagnosis,
     /// The effects found, with their estimates.
     pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
@@ -205,7 +206,8 @@ impl Model {
     /// options.
     ///
     /// Fails if a recording is too short, has no forces, or contains positions at which the loops of the mechanism
-    /// cannot close, and if the fitted model predicts the forces worse than a model without any force.
+    /// cannot close, and if the forces of the fitted model are worse than the prediction that all forces are
+    /// zero.
     pub fn diagnose(
         &self,
         fit: &[&PreparedRecording],
@@ -291,7 +293,7 @@ impl Model {
         let [fit_data, check_data] = data;
         // The given model, for comparison.
         let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
-        let places = judged_error_locations(&before)?;
+        let error_locations = judged_error_locations(&before)?;
         let left = after.version().map(self::judged_error_locations).transpose()?;
         let variables = variables(&before)?;
         let mut findings = DiagnosisFindings {
@@ -309,7 +311,7 @@ impl Model {
             after,
             entries,
             edited,
-            places,
+            error_locations,
             residual_locations: left,
             validation: judged,
             notes,
@@ -561,7 +563,7 @@ fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
                 .to_owned(),
         separating_experiment: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
     };
-    findings.diagnosis.undetermined_effects.iter().map(of).collect()
+    findings.diagnosis.undecided_effects.iter().map(of).collect()
 }
 
 /// Experiment that distinguishes an effect from its alternatives, by the text of the library.
@@ -618,10 +620,13 @@ fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<
 fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     let diagnosis = &findings.answer.diagnosis;
     if diagnosis.verdict != DiagnosisVerdict::Unexplained {
-        return findings.places.regions.clone();
+        return findings.error_locations.regions.clone();
     }
     let channels = &findings.answer.problem.layout.channels;
-    let left = findings.residual_locations.as_ref().unwrap_or(&findings.places);
+    let left = findings
+        .residual_locations
+        .as_ref()
+        .unwrap_or(&findings.error_locations);
     let mut regions = Vec::new();
     // Each unexplained drive has at least one region.
     for d in &diagnosis.unexplained {

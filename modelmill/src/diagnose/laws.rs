@@ -137,9 +137,11 @@ fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
     (0..values.len()).map(at).collect()
 }
 
-/// A law that would explain the residual; a hypothesis.
+/// A force law with the names of the model; it has a place, a formula and values. It belongs to a
+/// [`NamedLawProposal`]. The search has the same law as [`SiteLaw`](modelmill_identify::diagnose::SiteLaw), with
+/// indices in place of names.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ProposedLaw {
+pub struct NamedLaw {
     /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives
     /// (`_length`) and loads of drives (by the names of the drives).
     pub expression: String,
@@ -168,16 +170,17 @@ pub struct LawEntry {
     pub effect: NewEffect,
 }
 
-/// A law with others that explain the recordings equally well.
+/// A proposed law, with its alternatives: other laws that explain the recordings equally well. It is a hypothesis. The
+/// search has the same proposal as [`LawProposal`], with indices in place of names.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LawHypothesis {
+pub struct NamedLawProposal {
     /// The simplest law.
-    pub law: ProposedLaw,
+    pub law: NamedLaw,
     /// Other laws that explain the recordings equally well, the best first.
-    pub near_ties: Vec<ProposedLaw>,
+    pub near_ties: Vec<NamedLaw>,
 }
 
-impl ProposedLaw {
+impl NamedLaw {
     /// The formula with its place.
     pub fn label(&self) -> String {
         format!("{} at {}", self.expression, self.at)
@@ -185,11 +188,11 @@ impl ProposedLaw {
 }
 
 /// Laws that a diagnosis proposes, by the names of the model.
-pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHypothesis> {
+pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<NamedLawProposal> {
     let sites = &diagnosis.sites;
     let effects: Vec<&LocatedEffect> = diagnosis.effects.iter().map(|one| &one.effect).collect();
     // Alternatives are named in the same way.
-    let one = |proposal: &LawProposal| LawHypothesis {
+    let one = |proposal: &LawProposal| NamedLawProposal {
         law: law(model, sites, &effects, &proposal.law),
         near_ties: (proposal.near_ties.iter())
             .map(|tie| law(model, sites, &effects, tie))
@@ -199,7 +202,7 @@ pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHy
 }
 
 /// A law of the search with the names of the model; `effects` are those that were found.
-fn law(model: &Model, sites: &[LawSite], effects: &[&LocatedEffect], law: &Proposed) -> ProposedLaw {
+fn law(model: &Model, sites: &[LawSite], effects: &[&LocatedEffect], law: &Proposed) -> NamedLaw {
     let site = &sites[law.site];
     // A joint and the drive on it are one place.
     let place = joint_of(model, &site.name);
@@ -226,7 +229,7 @@ fn law(model: &Model, sites: &[LawSite], effects: &[&LocatedEffect], law: &Propo
             ));
         }
     }
-    ProposedLaw {
+    NamedLaw {
         expression,
         at: site.name.clone(),
         entry: library_entry(sites, law, &parameters),

@@ -10,10 +10,14 @@
 //! 2. `places`: lists the places of the mechanism on which effects may act.
 //! 3. `candidates`: derives the effects that `add` could add to the model file.
 //! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
-//! 5. `faults`, `contacts`: find faults of recordings and contacts before the search, and subtract their forces or
-//!    exclude their samples. After the search, contacts are searched once more, in its residual.
-//! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`, `signal_delays`: add candidates that
-//!    a model file cannot contain.
+//! 5. `faults`, `contacts`: find disturbances before the search (contacts, coarse quantisation, differences between
+//!    recordings), and subtract their forces or exclude their samples. After the search, contacts are searched once
+//!    more, in its residual.
+//! 6. Candidates that a model file cannot contain are added: `encoders` (wrong zeros, eccentricity), `gears` (elastic
+//!    gears, backlash), `friction_memory` (Dahl friction, which depends on the earlier motion), `payloads` (additional
+//!    bodies), `constants` (wrong lengths and angles), `tilt` (rotation of the base, through the change of the forces
+//!    with gravity), `held_friction` (change of friction that is fixed at the values of an earlier day),
+//!    `signal_delays` (delays of force signals).
 //! 7. `problem`: formulates the search with all of these, and solves it.
 //!    `zero_or_tilt` adds wrong zeros of encoders as alternatives of a tilt.
 //! 8. `estimates`, `added_effects`: give each effect found one value per parameter, and add the effects to the model file, in
@@ -46,13 +50,13 @@ mod encoders;
 mod estimates;
 mod faults;
 mod findings;
+mod friction_memory;
 mod gears;
 mod geometry_alternatives;
 mod held_friction;
 mod laws;
 mod long_recordings;
 mod measured_play;
-mod memory;
 mod model_versions;
 mod named_zeros;
 pub(crate) mod numbers;
@@ -77,7 +81,7 @@ pub use findings::{
     DiagnosisFindings, DiagnosisOptions, MissingEffect, NominalDiagnosis, SeparationProposal, UndecidedEffect,
 };
 pub use geometry_alternatives::{GeometryAlternative, GeometryError};
-pub use laws::{LawEntry, LawHypothesis, ProposedLaw};
+pub use laws::{LawEntry, NamedLaw, NamedLawProposal};
 pub use model_versions::{ForceComparison, ModelVersion};
 pub use modelmill_identify::diagnose::{
     DiagnosisVerdict, Disturbance, EstimatedQuantity, LocatedEffect, ModelDiagnosis, RejectionReason, ResidualBudget,

@@ -91,7 +91,7 @@ fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
     let nominal = version.model.values[k];
     // A fixed seed: the same recording always gives the same warning.
     let mut random = Random::new(1);
-    let may_turn = |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";
+    let may_turn = |i: usize| version.model.sign_of_parameter(i) == Sign::Any && mechanism.parameters[i].unit != "m";
     // A value that is zero in the file may be as large as the largest one of its unit.
     let size = |i: usize| {
         let own = &mechanism.parameters[i];

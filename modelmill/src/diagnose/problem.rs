@@ -29,11 +29,11 @@ use super::contacts::{
 use super::encoders::{self, encoders};
 use super::estimates::round_by_deviation;
 use super::faults::subtract_known;
+use super::friction_memory::dahl_candidates;
 use super::gears::gears;
 use super::held_friction;
 use super::laws::sites;
 use super::measured_play;
-use super::memory::dahl_candidates;
 use super::named_zeros::NamedZeros;
 use super::numbers::{layout, stack, variables};
 use super::payloads::{frame_loads, load_changes, payloads, reach};

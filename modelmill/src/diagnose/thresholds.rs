@@ -3,7 +3,7 @@
 //! are used.
 
 /// Most relative error on validation data, as a part of the force (1), for which findings are reported: above 1
-/// a model without any force would do better. By definition.
+/// the prediction that all forces are zero would be better. By definition.
 pub(super) const MOST_VALIDATION_ERROR: f64 = 1.0;
 
 /// Differences between recordings are assumed only if leaving them out makes the mean square residual this many

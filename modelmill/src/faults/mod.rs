@@ -1,12 +1,18 @@
-//! Faults of recordings that make all numbers meaningless: time base, units, signs, exchanged columns, direction of
-//! gravity, dead channels. A prepared recording goes in; faults come out, each with what was found, what to do, and the
-//! operation that corrects it.
+//! Faults of recordings that make all numbers meaningless. There are two sorts:
 //!
-//! The faults are entries of one list. An entry proposes hypotheses. The criterion is the same for all hypotheses: how
-//! much the correction lowers the error of the model, with all parameters fitted and with nominal values. The decrease
-//! must be clear, and no other hypothesis may explain the recording equally well.
+//! - Suspected mistakes ([`SuspectedFault`]): a wrong time unit, unit or sign of a column, exchanged columns, or a
+//!   wrong direction of gravity. An operation on columns, or on gravity, corrects them.
+//! - Forces that were not measured for some time (`silent`): dead, frozen or clipped force signals, and brakes. These
+//!   samples are left out.
 //!
-//! Decision: reading a recording reports faults and does not correct them. Only a diagnosis corrects them, and its
+//! A prepared recording goes in; faults come out, each with what was found and what to do. In results, both sorts are
+//! also listed as [`Disturbance`], the word for everything in a recording that is not a missing effect.
+//!
+//! The mistakes are entries of one list. An entry proposes hypotheses. The criterion is the same for all hypotheses:
+//! how much the correction lowers the error of the model, with all parameters fitted and with nominal values. The
+//! decrease must be clear, and no other hypothesis may explain the recording equally well.
+//!
+//! Decision: reading a recording reports mistakes and does not correct them. Only a diagnosis corrects them, and its
 //! verdict begins with them. Exceptions are wrapped angles, which are unwrapped, and forces that were not measured,
 //! which are left out, both with a note.
 
@@ -39,7 +45,8 @@ use correction::{ForceChange, MotionChange};
 pub(crate) use judge::{correction_score, find_fault};
 pub(crate) use silent::{SilentInterval, silent_intervals};
 
-/// Kinds of faults of recordings.
+/// Kinds of faults of recordings. The first five are mistakes, which a [`SuspectedFault`] states with their correction.
+/// The others are disturbances of single signals, which are repaired or left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RecordingFaultKind {
     /// The time is in another unit.
@@ -97,7 +104,8 @@ impl RecordingFaultKind {
     }
 }
 
-/// A suspected fault of a recording.
+/// A suspected mistake: a wrong name, sign or unit of a recorded column, or a wrong direction of gravity in the model
+/// file. Unlike other disturbances, it can be corrected; until then, all results are doubtful.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SuspectedFault {
     /// Its kind.
@@ -164,7 +172,7 @@ pub(crate) fn is_named_by_verdict(one: &Disturbance) -> bool {
     one.kind == RecordingFaultKind::GravityDirection.name()
 }
 
-/// Whether a disturbance is a suspected fault that makes all other findings doubtful until it is corrected.
+/// Whether a disturbance is a suspected mistake that makes all other findings doubtful until it is corrected.
 pub(crate) fn is_suspicion(one: &Disturbance) -> bool {
     const SUSPICIONS: [RecordingFaultKind; 4] = [
         RecordingFaultKind::ExchangedColumns,
@@ -235,7 +243,7 @@ trait RecordingFaultEntry: Sync {
     fn hypotheses(&self, subject: &FaultSubject<'_>, bench: &FaultBench<'_>) -> Vec<FaultHypothesis>;
 }
 
-/// The list of faults that are corrected by an operation on columns.
+/// The list of mistakes that are corrected by an operation on columns.
 const ENTRIES: [&dyn RecordingFaultEntry; 8] = [
     &time_base::TimeUnit,
     &angle_units::AngleUnit,

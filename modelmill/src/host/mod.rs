@@ -194,7 +194,8 @@ impl Host {
         })
     }
 
-    /// Validates the text of a model file; `path` is its name in messages, and paths in the text are relative to it.
+    /// Validates the text of a model file. The file is not read from `path`: the path is its name in messages, and
+    /// paths in the text are relative to it.
     ///
     /// Fails with all errors and warnings of the files, each with its line and column.
     pub fn load_text(&self, path: &Path, text: &str) -> Outcome<LoadedModel> {
@@ -228,7 +229,7 @@ impl Host {
         Ok(FitFile::read_from(self.files(), path)?)
     }
 
-    /// Reads a fit from the text of its file; `file` is the name of the file in messages.
+    /// Reads a fit from the text of its file. `file` is only used in messages, as the name of the fit.
     ///
     /// Fails as [`Host::fit`] does.
     pub fn fit_of_text(&self, text: &str, file: &str) -> Outcome<FitFile> {

@@ -35,7 +35,7 @@ pub use refine::{EstimateRefinement, RefinementResult};
 use regression::{InstrumentStatistics, RegressionEstimate};
 use thresholds::{IMPOSSIBLE_SIGN_SIGMAS, WEAK_INSTRUMENT_CORRELATION};
 
-/// A fit, with the error figures of the nominal parameters on the same recordings.
+/// Result of [`Model::identify`]: the fit, and the error figures of the nominal parameters on the same recordings.
 pub struct Identification {
     /// The result as `identify` writes it to a fit file: values and standard deviations of all base parameters, error
     /// figures and notes.
@@ -44,7 +44,7 @@ pub struct Identification {
     pub nominal_fit: ErrorFigures,
     /// Error figures of the nominal parameters on the validation runs; `None` if there are none.
     pub nominal_check: Option<ErrorFigures>,
-    /// The suspected fault of the first recording that has one: until it is corrected, all values are doubtful.
+    /// The suspected mistake of the first recording that has one: until it is corrected, all values are doubtful.
     pub suspect: Option<SuspectedFault>,
     /// The solution of the least-squares problem from which `fit` was written: only the estimated parameters, with their
     /// covariance and further statistics.
@@ -344,7 +344,7 @@ fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter
     for (k, p) in parameters.iter().enumerate() {
         // Undetermined parameters keep their nominal sign and are not tested.
         let slack = IMPOSSIBLE_SIGN_SIGMAS * p.std.unwrap_or(0.0);
-        let (wrong, expected) = match model.sign(k) {
+        let (wrong, expected) = match model.sign_of_base_parameter(k) {
             Sign::Positive => (p.value < -slack, "positive"),
             Sign::Negative => (p.value > slack, "negative"),
             Sign::Any => continue,

@@ -90,7 +90,7 @@ impl Model {
     }
 
     /// Reads a model from the text of its file and derives its equations. The text must not extend another file. `name`
-    /// is the name of the file in messages.
+    /// is only used as the name of the model and of its file in messages.
     ///
     /// Fails as [`Model::open`] does.
     ///
@@ -346,8 +346,8 @@ impl Model {
         products
     }
 
-    /// The sign that a dynamic parameter must have. `parameter` is its index in the mechanism.
-    pub fn sign_of(&self, parameter: usize) -> Sign {
+    /// The sign that a dynamic parameter must have, such as that of a mass. `parameter` is its index in the mechanism.
+    pub fn sign_of_parameter(&self, parameter: usize) -> Sign {
         self.signs[parameter]
     }
 
@@ -383,7 +383,7 @@ impl Model {
     }
 
     /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
-    /// an effect. The retained product is that of its regressor column, which is kept.
+    /// an effect. The retained product is the product whose regressor column is kept for this base parameter.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;
@@ -393,8 +393,8 @@ impl Model {
     }
 
     /// The sign that a base parameter must have: that of its products if all of them must have the same sign, otherwise
-    /// `Any`.
-    pub fn sign(&self, k: usize) -> Sign {
+    /// `Any`. `k` is its index in [`Model::base`].
+    pub fn sign_of_base_parameter(&self, k: usize) -> Sign {
         // Even powers keep the sign; a factor of unknown sign leaves the product open.
         let sign_of = |(product, factor): &(&ParameterMonomial, f64)| {
             let mut is_positive = *factor > 0.0;
@@ -465,10 +465,10 @@ impl Model {
         undriven.map(|drive| drive.name.clone()).collect()
     }
 
-    /// Unit of the force of a drive: `N` or `N m`. `drive` is an index into [`Model::row_names`].
-    pub fn force_unit(&self, drive: usize) -> &'static str {
+    /// Unit of the force of a row of the regressor: `N` or `N m`. `row` is an index into [`Model::row_names`].
+    pub fn force_unit(&self, row: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;
-        mechanism.drives[drive].kind.force_unit(&mechanism.coordinates)
+        mechanism.drives[row].kind.force_unit(&mechanism.coordinates)
     }
 
     /// The base parameters in the form of a fit file: name, expression, unit and nominal value.
@@ -566,8 +566,9 @@ impl Model {
         self.identified[k]
     }
 
-    /// Whether the model has a value for a base parameter: an identified one, or a nominal one because the file gives values
-    /// for all factors of at least one of its products. Zero counts as a value.
+    /// Whether the model has a value for a base parameter: an identified one, or one from the nominal values of the
+    /// file. A base parameter is a sum of products of parameters. The file gives a value if all parameters of at least
+    /// one of the products have a nominal value, which may be 0.
     pub fn has_values(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;

@@ -20,9 +20,9 @@ pub struct BaseParameterValues {
 }
 
 impl Model {
-    /// The values of the model: [`Model::values`] with their covariance. Base parameters for which the file gives none are 0,
-    /// which a note states.
-    pub fn nominal_values(&self) -> BaseParameterValues {
+    /// The values that the model uses (identified or nominal), with their covariance if they come from a fit that has
+    /// one. Base parameters for which the file gives no value are 0, which a note states.
+    pub fn base_parameter_values(&self) -> BaseParameterValues {
         let without: Vec<&str> = (0..self.base.len())
             .filter(|k| !self.has_values(*k))
             .map(|k| self.base[k].expression.as_str())
@@ -37,13 +37,13 @@ impl Model {
         }
         BaseParameterValues {
             values: self.values.clone(),
-            covariance: None,
+            covariance: self.covariance.as_deref().cloned(),
             gains: Vec::new(),
             notes,
         }
     }
 
-    /// The values of a fit; `file` is its name in messages.
+    /// The values of a fit. `file` is only used in messages, as the name of the fit.
     ///
     /// Fails when the fit lacks a base parameter of this model, or was made with other equations.
     pub fn values_of(&self, fit: &FitFile, file: &str) -> Outcome<BaseParameterValues> {

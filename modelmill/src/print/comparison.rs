@@ -18,8 +18,8 @@ impl ModelComparison {
         // The figures are part of the object itself, not a member of it.
         if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
             object.extend(figures.clone());
-            object.insert("where".to_owned(), json!(self.places.regions));
-            object.insert("by_rate".to_owned(), json!(self.places.by_rate));
+            object.insert("where".to_owned(), json!(self.error_locations.regions));
+            object.insert("by_rate".to_owned(), json!(self.error_locations.by_rate));
             object.insert("data".to_owned(), notes(&self.notes, wording));
             let next = self.next_step().map(|step| step.format_for(wording));
             object.insert("next".to_owned(), json!(next));
@@ -40,8 +40,8 @@ impl ModelComparison {
         lines.extend(tables::figures(&[("error", &self.figures)]));
         lines.push(String::new());
         lines.push(style.bold("Where the error is largest"));
-        lines.extend(tables::places(&self.places));
-        let by_rate = tables::by_rate(&self.places);
+        lines.extend(tables::places(&self.error_locations));
+        let by_rate = tables::by_rate(&self.error_locations);
         if !by_rate.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("How the residual depends on the velocity of its drive"));

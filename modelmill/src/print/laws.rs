@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::findings::{estimate_answers, values_text};
 use crate::answers::{LawAnswer, LawHypothesisAnswer};
-use crate::diagnose::{LawHypothesis, ProposedLaw, words};
+use crate::diagnose::{NamedLaw, NamedLawProposal, words};
 use crate::model::Model;
 use crate::print::StepWording;
 use crate::text::TerminalStyle;
@@ -21,15 +21,15 @@ pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, 
 
 /// Laws, the best first, each with its alternatives.
 pub(super) fn law_answers(
-    laws: &[LawHypothesis],
+    laws: &[NamedLawProposal],
     model: &Model,
     wording: &dyn StepWording,
 ) -> Vec<LawHypothesisAnswer> {
-    let one = |hypothesis: &LawHypothesis| {
+    let one = |hypothesis: &NamedLawProposal| {
         let ties = hypothesis.near_ties.iter();
         LawHypothesisAnswer {
             law: law_answer(&hypothesis.law, model, wording),
-            near_ties: ties.clone().map(ProposedLaw::label).collect(),
+            near_ties: ties.clone().map(NamedLaw::label).collect(),
             ties: ties.map(|tie| law_answer(tie, model, wording)).collect(),
             says: HYPOTHESIS.to_owned(),
         }
@@ -38,7 +38,7 @@ pub(super) fn law_answers(
 }
 
 /// A law with its entry for a library and the step that adds it.
-fn law_answer(law: &ProposedLaw, model: &Model, wording: &dyn StepWording) -> LawAnswer {
+fn law_answer(law: &NamedLaw, model: &Model, wording: &dyn StepWording) -> LawAnswer {
     let entry = law.entry.as_ref();
     LawAnswer {
         expression: law.expression.clone(),
@@ -56,7 +56,7 @@ fn law_answer(law: &ProposedLaw, model: &Model, wording: &dyn StepWording) -> La
 
 /// Laws as lines of text.
 pub(super) fn text(
-    laws: &[LawHypothesis],
+    laws: &[NamedLawProposal],
     model: &Model,
     style: TerminalStyle,
     wording: &dyn StepWording,
@@ -104,7 +104,7 @@ pub(super) fn text(
 }
 
 /// Which share of the residual a law explains, and which effects it makes unnecessary.
-pub(crate) fn gain(law: &ProposedLaw) -> String {
+pub(crate) fn gain(law: &NamedLaw) -> String {
     let mut says = format!(
         "explains {} of the squared residual on data that were not fitted",
         percent(Some(law.gain))

@@ -203,7 +203,7 @@ impl ModelComparison {
         let look = ResidualLook {
             figures: &self.figures,
             nominal: None,
-            by_rate: &self.places.by_rate,
+            by_rate: &self.error_locations.by_rate,
             correlations: &[],
             suspect: self.suspect.as_ref(),
         };

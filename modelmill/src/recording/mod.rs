@@ -123,7 +123,7 @@ impl Model {
     }
 
     /// As [`Model::recording`], for named columns in memory, such as those of a data frame. NaN marks
-    /// missing values. `name` is the name of the table in messages.
+    /// missing values. `name` is only used in messages, as the name of the table.
     ///
     /// Fails as [`Model::recording`] does, and when columns differ in length.
     pub fn recording_of_table(

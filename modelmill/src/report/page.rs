@@ -276,8 +276,8 @@ fn location(findings: &DiagnosisFindings) -> String {
     // Both models are shown if the second one could be built.
     let after = findings.after.version();
     let mut html = String::new();
-    html.push_str(&sentences(&findings.places, "The error of the given model"));
-    if !findings.places.regions.is_empty() {
+    html.push_str(&sentences(&findings.error_locations, "The error of the given model"));
+    if !findings.error_locations.regions.is_empty() {
         let _ = writeln!(
             html,
             "<p>Mean and standard deviation of the error as functions of one variable. The range named in the caption is shaded. \
@@ -285,13 +285,13 @@ fn location(findings: &DiagnosisFindings) -> String {
             legend(after.is_some())
         );
         html.push_str(&regions::figures(
-            &findings.places.regions,
+            &findings.error_locations.regions,
             &findings.before,
             after,
             &findings.variables,
         ));
     }
-    html.push_str(&by_rate(&findings.places));
+    html.push_str(&by_rate(&findings.error_locations));
     // Regions of the residual are listed without pictures.
     if let Some(left) = &findings.residual_locations {
         html.push_str("<h3>Residual with the effects</h3>\n");

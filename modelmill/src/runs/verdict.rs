@@ -46,12 +46,12 @@ pub enum UndecidedReason {
     },
     /// The model leaves most of the force unexplained.
     UnexplainedForce {
-        /// Share of the rms force in the worse run (1).
+        /// Share of the rms force in the worse run.
         share: f64,
     },
     /// A change would be reported only if it were a large part of the force.
     SmallestChange {
-        /// The smallest change that would be reported, as a share of the force (1); infinite if no change would be.
+        /// The smallest change that would be reported, as a share of the force; infinite if no change would be.
         share: f64,
     },
     /// The drive is at standstill nearly all the time, so that its friction is unknown.

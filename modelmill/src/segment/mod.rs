@@ -1,5 +1,5 @@
-//! A segment of a recording without gaps in time, prepared for a model. States are visited block by block, and faults
-//! name the time and the line of the recording.
+//! A segment of a recording without gaps in time, prepared for a model. States are visited block by block, and error
+//! messages state the time and the line of the recording.
 
 pub(crate) mod computed_forces;
 pub(crate) mod picked_states;
@@ -145,7 +145,7 @@ impl RecordingSegment {
     }
 
     /// Calls `visit` with one block of states after the other. `visit` returns a [`PoseFault`] in its inner result if a
-    /// pose has no solution. The fault becomes an error with its place in the recording.
+    /// pose has no solution. The error message then states its place in the recording.
     ///
     /// Fails with the first pose without a solution, with any error of `visit`, and when an effect needs a load
     /// that is missing.

@@ -637,7 +637,7 @@ fn remarks(servo: &ServoModel, unknown: &[usize], solved: &ServoSolution, delays
     }
     for (at, k) in unknown.iter().enumerate() {
         let (value, std) = (solved.solution.values[at], solved.uncertainty.std[at]);
-        if servo.equations.sign(*k) == Sign::Positive && value < -IMPOSSIBLE_SIGMAS * std {
+        if servo.equations.sign_of_base_parameter(*k) == Sign::Positive && value < -IMPOSSIBLE_SIGMAS * std {
             notes.push(RecordingNote::warning(message!(
                 "{} is negative, which is not possible: the model of the servo or of the machine is wrong; check the kind of \
                  actuator, its signal, and whether the controller adds a feed-forward force.",

@@ -1,4 +1,4 @@
-//! Models with actuators: what can be known without a measured force, and estimates from servo logs.
+//! Models with actuators: base parameters, or their ratios, estimated from commands or currents instead of measured forces.
 //!
 //! A model whose file has `[[actuator]]` goes in, with recordings of commands, currents or voltages. Out come base
 //! parameters and gains with standard deviations, the delay of each servo, and the parameters whose values must be
@@ -50,7 +50,7 @@ impl Model {
         &self.loaded.mechanism.actuators
     }
 
-    /// The model with the forces of its actuators in its equations, and the base parameters of which its signals
+    /// The model with the forces of its actuators in its equations. It also lists the base parameters for which the signals
     /// determine only ratios.
     ///
     /// Fails when the model has no actuators, when an effect depends on the load of a drive, or when the equations

@@ -106,7 +106,7 @@ impl VariantComparison {
         let motions = stretches(runs[0]);
         let mut notes = counterparts.notes.clone();
         notes.extend(load_note(models));
-        for note in models.into_iter().flat_map(|m| m.nominal_values().notes) {
+        for note in models.into_iter().flat_map(|m| m.base_parameter_values().notes) {
             if !notes.contains(&note) {
                 notes.push(note);
             }

@@ -131,7 +131,7 @@ linear = {{ planar = "_2", nominal = {{ ZZ = 0.1, MX = 0.2, MY = 0.0, M = 1 }} }
     let far = counts(&four_bar(fold - 0.8)).2;
     assert!(!far.iter().any(|says| says.contains("near a fold")), "{far:?}");
     // A nominal value of zero is a value.
-    let notes = model(&four_bar(fold - 0.8)).nominal_values().notes;
+    let notes = model(&four_bar(fold - 0.8)).base_parameter_values().notes;
     assert!(
         notes.is_empty(),
         "{:?}",
@@ -146,7 +146,7 @@ fn recorded_twists_of_a_free_body_are_not_filtered() {
     let Some(path) = file("ant.csv") else { return };
     let table = std::fs::read_to_string(path).expect("states");
     let model = model(&text("ant.toml").expect("a model"));
-    let values = model.nominal_values().values;
+    let values = model.base_parameter_values().values;
     let folder = std::env::temp_dir().join(format!("modelmill-ant-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     let forces = |lines: &[&str], name: &str| {

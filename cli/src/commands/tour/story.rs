@@ -129,7 +129,7 @@ impl TourText {
             self.line("");
         }
         self.line("Where the error is largest:");
-        self.lines(&tables::places(&seen.compared.places));
+        self.lines(&tables::places(&seen.compared.error_locations));
         self.line("");
         self.paragraph("This shows where the error is large, not its cause.");
         self.command(&format!(

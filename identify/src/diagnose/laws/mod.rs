@@ -48,7 +48,7 @@ pub struct LawTerm {
     pub standard_deviations: Vec<f64>,
 }
 
-/// A law at a place.
+/// A law at a place, as the search finds it: its place is an index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteLaw {
     /// Index of the place where it acts, among the sites of the diagnosis.
@@ -62,7 +62,8 @@ pub struct SiteLaw {
     pub replaced_effects: Vec<LocatedEffect>,
 }
 
-/// A proposal for an unexplained residual: the simplest of the best laws.
+/// A proposed law for an unexplained residual, with its alternatives. The law is the simplest of those that explain the
+/// residual equally well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawProposal {
     /// The law.

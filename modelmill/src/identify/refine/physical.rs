@@ -277,7 +277,7 @@ impl Model {
         let mut found: Vec<usize> = effects
             .iter()
             .flat_map(|effect| effect.terms.iter().map(|term| term.parameter.0))
-            .filter(|p| self.sign_of(*p) == Sign::Positive)
+            .filter(|p| self.sign_of_parameter(*p) == Sign::Positive)
             .collect();
         found.sort_unstable();
         found.dedup();

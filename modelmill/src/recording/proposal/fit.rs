@@ -103,7 +103,7 @@ pub(super) fn compare_forces(
 
 /// The nominal values of all base parameters; `None` if one has none.
 fn nominal_parameters(model: &Model) -> Option<DVector<f64>> {
-    let values = model.nominal_values().values;
+    let values = model.base_parameter_values().values;
     let is_known = (0..values.len()).all(|k| model.has_values(k));
     is_known.then(|| DVector::from_vec(values))
 }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::problem::{CandidateNature, ColumnSource, LocatedEffect};
-use super::thresholds::{UNDETERMINED_LEAST_SHARE, UNDETERMINED_MOST_VARIANCES};
+use super::thresholds::{UNDECIDED_LEAST_SHARE, UNDECIDED_MOST_VARIANCES};
 use crate::signal::dot;
 
 /// Largest number of samples that are used.
@@ -16,7 +16,7 @@ const MOST: usize = 2000;
 impl EffectSelector<'_> {
     /// Effects that a set with the residual `rest` cannot decide. Only effects with one choice of columns at one place
     /// are considered.
-    pub(crate) fn find_undetermined(&self, picks: &[SelectedEffect], rest: &[Vec<f64>]) -> Vec<LocatedEffect> {
+    pub(crate) fn find_undecided(&self, picks: &[SelectedEffect], rest: &[Vec<f64>]) -> Vec<LocatedEffect> {
         // Use every n-th sample if there are many.
         let every = self.pool.all_samples().len().div_ceil(MOST).max(1);
         // Orthonormal basis of the columns of model and set (Gram-Schmidt); dependent columns are skipped.
@@ -25,11 +25,11 @@ impl EffectSelector<'_> {
             let column = self.stacked_column(k, every);
             let left = project_out(&basis, &column);
             let size = left.norm();
-            if size * size > UNDETERMINED_LEAST_SHARE * column.norm_squared() {
+            if size * size > UNDECIDED_LEAST_SHARE * column.norm_squared() {
                 basis.push(left / size);
             }
         }
-        let mut untold = Vec::new();
+        let mut undecided = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
             let ColumnSource::Columns(choices) = &candidate.source else {
                 continue;
@@ -62,13 +62,13 @@ impl EffectSelector<'_> {
                 .sum();
             // Undecidable if the uncertainty of its force exceeds the force of the drives. The weights make both
             // relative to the residual.
-            if share > UNDETERMINED_LEAST_SHARE
-                && self.effective_equations(rest, &channels) * share * force < UNDETERMINED_MOST_VARIANCES
+            if share > UNDECIDED_LEAST_SHARE
+                && self.effective_equations(rest, &channels) * share * force < UNDECIDED_MOST_VARIANCES
             {
-                untold.push(candidate.effect.clone());
+                undecided.push(candidate.effect.clone());
             }
         }
-        untold
+        undecided
     }
 
     /// Every `every`-th sample of a column, channels one after the other, each divided by the standard deviation of its
@@ -120,7 +120,7 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     let squares = shares
         .iter()
         .map(|s| s * s)
-        .filter(|share| *share > UNDETERMINED_LEAST_SHARE);
+        .filter(|share| *share > UNDECIDED_LEAST_SHARE);
     squares.min_by(f64::total_cmp)
 }
 
