@@ -321,6 +321,27 @@ impl ModelActuator {
         }
     }
 
+    /// Change of its force per unit of the signal, of the signal's rate, of the position and of its rate, without limits. The
+    /// force of every kind is linear in these. `constant` returns the value of a constant by its index, `gain` that of the
+    /// parameters of a term.
+    pub fn slopes(&self, constant: &dyn Fn(usize) -> f64, gain: &dyn Fn(&ActuatorTerm) -> f64) -> [f64; 4] {
+        let gains: Vec<f64> = self.terms.iter().map(gain).collect();
+        let force = |states: [f64; 4]| -> f64 {
+            let symbol = |symbol: ModelSymbol| match symbol {
+                ModelSymbol::Constant(c) => constant(c.0),
+                ModelSymbol::Place(PlaceQuantity::OtherCoordinate) => states[0],
+                ModelSymbol::Place(PlaceQuantity::OtherRate) => states[1],
+                ModelSymbol::Place(PlaceQuantity::Coordinate) => states[2],
+                ModelSymbol::Place(PlaceQuantity::Rate) => states[3],
+                _ => 0.0,
+            };
+            let terms = self.terms.iter().zip(&gains);
+            terms.map(|(term, gain)| gain * term.factor.evaluate(&symbol)).sum()
+        };
+        let unit = |place: usize| std::array::from_fn(|k| if k == place { 1.0 } else { 0.0 });
+        std::array::from_fn(|place| force(unit(place)))
+    }
+
     /// Whether its force depends on the error of a position.
     pub fn has_position_error(&self) -> bool {
         self.quantity == SignalQuantity::Position

@@ -1,12 +1,12 @@
 //! Actuators in a simulation forward in time: the recorded signal and the simulated state of the drive go in, the force
 //! comes out.
 //!
-//! Decision: the force of every kind of actuator is linear in its signal, the position of the drive and their rates, apart
-//! from limits. Five states give the coefficients, which are the stiffness and the damping of the servo at once.
+//! The force of every kind of actuator is linear in its signal, the position of the drive and their rates, apart from limits.
+//! The coefficients are the stiffness and the damping of the servo at once.
 
 use modelmill_spec::ModelActuator;
 
-use super::forces::{ActuatorStates, interpolate_at};
+use super::forces::interpolate_at;
 use super::gains::GainValues;
 use crate::model::Model;
 
@@ -19,9 +19,7 @@ pub(crate) struct SimulatedActuator {
     pub(crate) is_commanded: bool,
     /// Its limits.
     actuator: ModelActuator,
-    /// The force at zero states, N or N m.
-    offset: f64,
-    /// Change of the force per unit of the signal, of its rate, of the position and of its rate.
+    /// See [`ModelActuator::slopes`].
     slopes: [f64; 4],
     /// The signal, delayed, by sample.
     signal: Vec<f64>,
@@ -37,25 +35,12 @@ impl SimulatedActuator {
         gains: &GainValues,
         [signal, signal_rate]: [Vec<f64>; 2],
     ) -> Self {
-        let unlimited = ModelActuator {
-            saturation: None,
-            dead_band: None,
-            ..actuator.clone()
-        };
-        let unit = |place: usize| -> Vec<f64> { (0..5).map(|k| if k == place { 1.0 } else { 0.0 }).collect() };
-        let states = ActuatorStates {
-            signal: unit(1),
-            signal_rate: unit(2),
-            position: unit(3),
-            rate: unit(4),
-        };
-        let forces = states.forces(model, &unlimited, gains);
+        let constants = &model.derivation.mechanism.constants;
         Self {
             drive: actuator.drive.0,
             is_commanded: actuator.kind.is_commanded(),
             actuator: actuator.clone(),
-            offset: forces[0],
-            slopes: std::array::from_fn(|k| forces[k + 1] - forces[0]),
+            slopes: actuator.slopes(&|c| constants[c].value, &|term| gains.term_value(term)),
             signal,
             signal_rate,
         }
@@ -71,7 +56,7 @@ impl SimulatedActuator {
             rate,
         ];
         let sum: f64 = self.slopes.iter().zip(states).map(|(slope, state)| slope * state).sum();
-        self.actuator.limited_force(self.offset + sum)
+        self.actuator.limited_force(sum)
     }
 
     /// Stiffness and damping at the drive, N/m and N s/m, or N m/rad and N m s/rad.

@@ -5,7 +5,9 @@ use std::fmt::Write as _;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Message;
-use modelmill_spec::{CoordinateIdx, DriveKind, Mechanism, ModelDrive, PointIdx};
+use modelmill_spec::{
+    ActuatorKind, ActuatorTerm, CoordinateIdx, DriveKind, Mechanism, ModelActuator, ModelDrive, PointIdx,
+};
 use nalgebra::UnitQuaternion;
 
 use super::friction::{PassiveEffects, PassiveProperties};
@@ -292,7 +294,8 @@ impl MjcfWriter<'_> {
         });
     }
 
-    /// Actuators: a motor for each drive that has a joint or a tendon, with its force limits.
+    /// Actuators: for each drive that has a joint or a tendon a position or velocity controller with the gains of the
+    /// model, or a motor. Both have the force limits of the drive.
     fn actuators(&mut self) {
         let m = self.mechanism;
         let drives = m.drives.iter().enumerate().map(|(d, one)| (Some(d), one));
@@ -309,11 +312,16 @@ impl MjcfWriter<'_> {
                 }
                 DriveKind::Linear { .. } => format!("tendon=\"{}_line\"", drive.name),
             };
+            let mut limits = m.limits.forces.iter();
+            let range = limits.find(|(i, _)| Some(i.0) == d).map(|(_, range)| *range);
+            if let Some(servo) = d.and_then(|d| self.servo_attributes(d, range)) {
+                let (element, attributes) = servo;
+                lines.push(format!("<{element} name=\"{}\" {on}{attributes}/>", drive.name));
+                continue;
+            }
             // The control of a motor is its force, so that limits of the force are its range.
-            let limits = m.limits.forces.iter();
-            let range = limits.clone().find(|(i, _)| Some(i.0) == d);
-            let range = range.map_or(String::new(), |(_, [low, high])| {
-                format!(" ctrlrange=\"{} {}\"", number_text(*low), number_text(*high))
+            let range = range.map_or(String::new(), |[low, high]| {
+                format!(" ctrlrange=\"{} {}\"", number_text(low), number_text(high))
             });
             lines.push(format!("<motor name=\"{}\" {on}{range}/>", drive.name));
         }
@@ -325,6 +333,76 @@ impl MjcfWriter<'_> {
                 w.line(&line);
             }
         });
+    }
+
+    /// Element and attributes of the controller of a drive; `None` for a motor. What MJCF cannot express is reported.
+    fn servo_attributes(&mut self, drive: usize, range: Option<[f64; 2]>) -> Option<(&'static str, String)> {
+        let m = self.mechanism;
+        let name = &m.drives[drive].name;
+        let own: Vec<&ModelActuator> = m.actuators.iter().filter(|one| one.drive.0 == drive).collect();
+        let element = match own.as_slice() {
+            [] => return None,
+            [one] if one.kind == ActuatorKind::PositionServo => "position",
+            [one] if one.kind == ActuatorKind::VelocityServo => "velocity",
+            _ => {
+                self.remarks.push(message!(
+                    "the actuators of `{name}` are no single position or velocity servo: they become a motor whose control is the force"
+                ));
+                return None;
+            }
+        };
+        let actuator = own[0];
+        let parameters = |one: &ActuatorTerm| one.parameters.iter().all(|(p, _)| m.parameters[p.0].has_nominal);
+        if !actuator.terms.iter().all(parameters) {
+            self.remarks.push(message!(
+                "a gain of `{name}` has no nominal value: its servo becomes a motor whose control is the force"
+            ));
+            return None;
+        }
+        let gain = |term: &ActuatorTerm| -> f64 {
+            let powers = term.parameters.iter();
+            let factors = powers.map(|(p, power)| {
+                m.parameters[p.0]
+                    .nominal
+                    .powi(i32::try_from(*power).unwrap_or(i32::MAX))
+            });
+            factors.product()
+        };
+        let [stiffness, command_rate, _, rate] = actuator.slopes(&|c| m.constants[c].value, &gain);
+        let mut text = String::new();
+        if element == "position" {
+            let _ = write!(text, " kp=\"{}\" kv=\"{}\"", number_text(stiffness), number_text(-rate));
+            if command_rate != 0.0 {
+                self.remarks.push(message!(
+                    "`kv` of the servo of `{name}` acts on the rate of its command too, which MJCF cannot express: left out"
+                ));
+            }
+        } else {
+            let _ = write!(text, " kv=\"{}\"", number_text(-rate));
+        }
+        let limit = actuator.saturation.map(|limit| [-limit.abs(), limit.abs()]);
+        let limit = match (limit, range) {
+            (Some([a, b]), Some([c, d])) => Some([a.max(c), b.min(d)]),
+            (one, other) => one.or(other),
+        };
+        if let Some([low, high]) = limit {
+            let _ = write!(text, " forcerange=\"{} {}\"", number_text(low), number_text(high));
+        }
+        if let Some(delay) = actuator.delay.filter(|delay| *delay > 0.0) {
+            // The buffer of the usual step of 2 ms holds the delay.
+            let samples = (delay / 0.002).ceil() + 1.0;
+            let _ = write!(text, " delay=\"{}\" nsample=\"{samples}\"", number_text(delay));
+        }
+        for (what, is_there) in [
+            ("dead band", actuator.dead_band.is_some()),
+            ("rate limit", actuator.rate_limit.is_some()),
+        ] {
+            if is_there {
+                self.remarks
+                    .push(message!("the {what} of the servo of `{name}` is left out"));
+            }
+        }
+        Some((element, text))
     }
 
     /// Whether a joint moves with a coordinate.

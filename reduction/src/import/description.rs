@@ -109,6 +109,21 @@ pub(crate) struct DescriptionJoint {
     pub(crate) rest: f64,
     /// Whether a drive acts on it.
     pub(crate) is_driven: bool,
+    /// The controller of its drive.
+    pub(crate) servo: Option<JointServo>,
+}
+
+/// A controller that is part of a drive: `kp*(command - position) - kd*rate`, or `kd*(command - rate)` without `kp`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct JointServo {
+    /// Stiffness, N m/rad or N/m; `None` for a controller of the rate.
+    pub(crate) kp: Option<f64>,
+    /// Damping, N m s/rad or N s/m.
+    pub(crate) kd: f64,
+    /// Delay of the command, s.
+    pub(crate) delay: f64,
+    /// Largest force, N m or N.
+    pub(crate) saturation: Option<f64>,
 }
 
 impl DescriptionJoint {
@@ -130,6 +145,7 @@ impl DescriptionJoint {
             stiffness: 0.0,
             rest: 0.0,
             is_driven: kind != DescriptionJointKind::Free,
+            servo: None,
         }
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use roxmltree::Node;
 
-use super::description::{DescriptionJointKind, StraightDrive};
+use super::description::{DescriptionJointKind, JointServo, StraightDrive};
 use super::mjcf::MjcfReader;
 use super::mjcf_attach::ATTACHED;
 use super::xml::{children, located_message, numbers, required_attribute};
@@ -246,10 +246,6 @@ impl<'a> MjcfReader<'a> {
         at_joints: &mut ActuatorRanges,
     ) -> Result<(), String> {
         let range = self.actuator_range(node)?.map(|range| scale_range(range, gear));
-        at_joints
-            .entry(name.to_owned())
-            .and_modify(|sum| *sum = sum.zip(range).map(|([a, b], [c, d])| [a + c, b + d]))
-            .or_insert(range);
         let armature = self.first(node, None, "armature")?;
         let damping = self.first(node, None, "damping")?;
         for (what, value) in [("armature", armature), ("damping", damping)] {
@@ -257,6 +253,11 @@ impl<'a> MjcfReader<'a> {
                 return Err(located_message(node, &format!("`{what}` cannot be negative")));
             }
         }
+        let servo = self.joint_servo(node, gear, at_joints.get(name).is_some())?;
+        at_joints
+            .entry(name.to_owned())
+            .and_modify(|sum| *sum = sum.zip(range).map(|([a, b], [c, d])| [a + c, b + d]))
+            .or_insert(range);
         // The joint by its name.
         let joint = self
             .out
@@ -267,6 +268,8 @@ impl<'a> MjcfReader<'a> {
             .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))?;
         // A free body cannot have a drive.
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
+        joint.servo =
+            servo.filter(|_| [DescriptionJointKind::Revolute, DescriptionJointKind::Prismatic].contains(&joint.kind));
         joint.armature += armature * (gear * gear);
         joint.damping += damping * (gear * gear);
         if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
@@ -276,6 +279,90 @@ impl<'a> MjcfReader<'a> {
             ));
         }
         Ok(())
+    }
+
+    /// The controller of a position or velocity actuator, or of a general one with the same force; `None` for actuators whose
+    /// control is a force. Controllers that the model cannot express are reported and left out, and so are all at a joint
+    /// with several actuators.
+    fn joint_servo(&mut self, node: &Node<'a, '_>, gear: f64, is_second: bool) -> Result<Option<JointServo>, String> {
+        let gains = match node.tag_name().name() {
+            "position" => {
+                let kp = self.text(node, None, "kp")?.is_some();
+                let kp = if kp { self.first(node, None, "kp")? } else { 1.0 };
+                Some([Some(kp), Some(self.first(node, None, "kv")?)])
+            }
+            "velocity" => {
+                let kv = self.text(node, None, "kv")?.is_some();
+                Some([None, Some(if kv { self.first(node, None, "kv")? } else { 1.0 })])
+            }
+            "general" => self.general_gains(node)?,
+            _ => None,
+        };
+        let Some([kp, Some(kd)]) = gains else {
+            return Ok(None);
+        };
+        let mut reasons = Vec::new();
+        if is_second {
+            reasons.push("another actuator acts on the same joint");
+        }
+        if gear != 1.0 {
+            reasons.push("its gear is not 1, so that its command is no position of the joint");
+        }
+        if self.first(node, None, "timeconst")? != 0.0 {
+            reasons.push("its command passes a filter (`timeconst`)");
+        }
+        if self.first(node, None, "dampratio")? != 0.0 {
+            reasons.push("its damping is given as `dampratio`");
+        }
+        if kp.unwrap_or(0.0) < 0.0 || kd < 0.0 {
+            reasons.push("a gain is negative");
+        }
+        if !reasons.is_empty() {
+            let remark = format!(
+                "its controller is left out, since {}; in the model the drive has a force",
+                reasons.join(" and ")
+            );
+            self.out.remarks.push(located_message(node, &remark));
+            return Ok(None);
+        }
+        // Unequal limits are those of the drive alone.
+        let range = self.limits(node, None, ["forcerange", "forcelimited"])?;
+        Ok(Some(JointServo {
+            kp,
+            kd,
+            delay: self.first(node, None, "delay")?,
+            saturation: range.filter(|[low, high]| *low == -*high).map(|[_, high]| high),
+        }))
+    }
+
+    /// Stiffness and damping of a general actuator whose force is that of a position or velocity controller.
+    fn general_gains(&self, node: &Node<'a, '_>) -> Result<Option<[Option<f64>; 2]>, String> {
+        let is_one_of = |key: &str, usual: &str, known: &str| {
+            Ok::<bool, String>(self.text(node, None, key)?.unwrap_or(usual) == known)
+        };
+        let is_affine = is_one_of("gaintype", "fixed", "fixed")?
+            && is_one_of("biastype", "none", "affine")?
+            && is_one_of("dyntype", "none", "none")?;
+        if !is_affine {
+            return Ok(None);
+        }
+        let all = |key: &str| {
+            let text = self.text(node, None, key)?;
+            text.map_or_else(|| Ok(Vec::new()), |text| numbers(node, key, text))
+        };
+        let (gain, bias) = (all("gainprm")?, all("biasprm")?);
+        let at = |all: &[f64], k: usize| all.get(k).copied().unwrap_or(0.0);
+        let gain = gain.first().copied().unwrap_or(1.0);
+        let [constant, stiffness, damping] = [0, 1, 2].map(|k| at(&bias, k));
+        Ok(if constant != 0.0 {
+            None
+        } else if gain == -stiffness {
+            Some([Some(gain), Some(-damping)])
+        } else if stiffness == 0.0 && gain == -damping {
+            Some([None, Some(gain)])
+        } else {
+            None
+        })
     }
 
     /// Limits the forces of driven joints: first by the actuators of each, then by its own limits, as in `MuJoCo`.

@@ -231,9 +231,17 @@ impl ModelTextBuilder<'_> {
         let is_leader = *leader == joint.name;
         if is_leader {
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
+            acts.servo.clone_from(&joint.servo);
         } else if joint.force.is_some() {
             self.remarks.push(message!(
                 "line {}: the force limit of `{}`, which follows `{leader}`, is left out: one drive moves both",
+                joint.line,
+                joint.name
+            ));
+        }
+        if !is_leader && joint.servo.is_some() {
+            self.remarks.push(message!(
+                "line {}: the controller of `{}`, which follows `{leader}`, is left out: one drive moves both",
                 joint.line,
                 joint.name
             ));

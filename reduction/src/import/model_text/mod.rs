@@ -19,7 +19,7 @@ use self::joints::closure_point;
 use self::lines::relative_variables;
 use super::chain::{ChainFrame, ChainMotion, FrameChain};
 use super::couplings::{self, ImportCouplings};
-use super::description::{DescriptionJointKind, DescriptionLink, RobotDescription};
+use super::description::{DescriptionJointKind, DescriptionLink, JointServo, RobotDescription};
 use super::placed::{DescriptionPose, roll_pitch_yaw, twelfths_of_pi};
 use super::{DescriptionImport, ImportedJoint, Options};
 use crate::write::{significant_digits, toml_float};
@@ -80,6 +80,8 @@ struct VariableForces {
     rate: Option<f64>,
     /// Limits of the drive's force, N m or N.
     force: Option<[f64; 2]>,
+    /// The controller of the drive.
+    servo: Option<JointServo>,
 }
 
 /// The model file as it is built: sections of text, the numeric kinematics, and names.

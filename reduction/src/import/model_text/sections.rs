@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::super::DescriptionImport;
 use super::super::closing::LoopSolution;
-use super::super::description::RobotDescription;
+use super::super::description::{JointServo, RobotDescription};
 use super::super::thresholds::ROUNDING_OF_ROTATION;
 use super::lines::NamedDriveLine;
 use super::{ImportCoordinate, ModelTextBuilder, round_to_15_digits};
@@ -184,7 +184,7 @@ impl ModelTextBuilder<'_> {
     ) {
         // Names and remarks are added during the loop, so that the coordinates are taken out first.
         let coordinates = std::mem::take(&mut self.coordinates);
-        let (mut drives, mut effects) = (String::new(), String::new());
+        let (mut drives, mut actuators, mut effects) = (String::new(), String::new(), String::new());
         let (mut ranges, mut forces) = (String::new(), String::new());
         for coordinate in &coordinates {
             // Coordinates of free bodies have neither drives nor effects.
@@ -202,6 +202,9 @@ impl ModelTextBuilder<'_> {
                     "\n[[drive]]\nname = \"{place}\"\njoint = \"{}\"\n",
                     coordinate.name
                 );
+                if let Some(servo) = &acts.servo {
+                    actuators.push_str(&servo_text(&place, servo));
+                }
             } else if coordinate.is_driven {
                 self.remarks.push(message!(
                     "`{}` is determined by loops and couplings; it has no separate drive in the model",
@@ -261,6 +264,10 @@ impl ModelTextBuilder<'_> {
         // Straight drives come after those of the joints.
         self.line_forces(lines, [&mut drives, &mut effects, &mut forces]);
         text.push_str(&drives);
+        // Surplus drives have no equations of their own.
+        if !self.has_surplus {
+            text.push_str(&actuators);
+        }
         text.push_str(&effects);
         // Tables of limits without entries are left out.
         for (table, entries) in [("coordinates", ranges), ("drives", forces)] {
@@ -269,6 +276,25 @@ impl ModelTextBuilder<'_> {
             }
         }
     }
+}
+
+/// The actuator of a drive with a controller.
+fn servo_text(drive: &str, servo: &JointServo) -> String {
+    let mut text = format!("\n[[actuator]]\ndrive = \"{drive}\"\n");
+    let _ = match servo.kp {
+        Some(kp) => write!(
+            text,
+            "kind = \"position_servo\"\nkp = {}\nkd = {}\n",
+            toml_float(kp),
+            toml_float(servo.kd)
+        ),
+        None => write!(text, "kind = \"velocity_servo\"\nkv = {}\n", toml_float(servo.kd)),
+    };
+    let _ = writeln!(text, "delay = {}", toml_float(servo.delay));
+    if let Some(limit) = servo.saturation {
+        let _ = writeln!(text, "saturation = {}", toml_float(limit));
+    }
+    text
 }
 
 /// Zero for an entry that is only rounding of entries of size `largest`.
