@@ -56,9 +56,10 @@ pub use estimate::{
 };
 pub use figures::{
     BandError, ChannelFigures, DriveResidual, EquationSample, ErrorAccumulator, ErrorFigures, ErrorRegion,
-    EstimatorOutput, FiguresError, FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError, FitGain,
-    FitParameter, LocateOptions, ParameterInfo, ParameterStatus, RateDependence, RateTerm, ResidualLevels, TIME_COLUMN,
-    TRIMMED_PART, add_filtered_forces, compare_forces, find_rate_dependence, fit_parameters, locate_errors,
+    EstimatorOutput, FiguresError, FilteredChannelFigures, FilteredFigures, FitDelay, FitFault, FitFile, FitFileError,
+    FitGain, FitParameter, LocateOptions, ParameterInfo, ParameterStatus, RateDependence, RateTerm, ResidualLevels,
+    TIME_COLUMN, TRIMMED_PART, add_filtered_forces, compare_forces, find_rate_dependence, fit_parameters,
+    locate_errors,
 };
 pub use motion::{
     DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun, RunRepeatability,

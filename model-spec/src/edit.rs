@@ -176,6 +176,8 @@ pub struct AdoptedValues {
     pub parameters: Vec<(String, f64)>,
     /// Values of base parameters by their expressions.
     pub base: Vec<(String, f64)>,
+    /// Delays of the only actuators of drives, by the names of the drives, s.
+    pub delays: Vec<(String, f64)>,
 }
 
 /// Writes identified values into the text of a model file and replaces earlier ones; everything else stays unchanged.
@@ -195,6 +197,7 @@ pub struct AdoptedValues {
 /// assert_eq!(write_identified(&text, &values).unwrap(), text);
 /// ```
 pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, String> {
+    let text = &write_delays(text, &values.delays)?;
     let mut log = DiagnosticLog::default();
     let table = document::parse_toml(text, 0, &mut log);
     if log.n_errors() > 0 {
@@ -240,6 +243,59 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
         kept.push_str(line_end);
     }
     Ok(kept + &identified_table(values, line_end))
+}
+
+/// Writes delays into the actuators of some drives that have none.
+///
+/// Fails if the text is not TOML.
+fn write_delays(text: &str, delays: &[(String, f64)]) -> Result<String, String> {
+    let mut log = DiagnosticLog::default();
+    let table = document::parse_toml(text, 0, &mut log);
+    if log.n_errors() > 0 {
+        return Err("this is not TOML; correct the file first".to_owned());
+    }
+    let mut edited = text.to_owned();
+    let Some((
+        _,
+        TomlNode {
+            value: TomlValue::Array(actuators),
+            ..
+        },
+    )) = find_key(&table, "actuator")
+    else {
+        return Ok(edited);
+    };
+    // From the last to the first, so that places before an edit stay valid.
+    for actuator in actuators.iter().rev() {
+        let TomlValue::Table(entries) = &actuator.value else {
+            continue;
+        };
+        let Some((
+            _,
+            TomlNode {
+                value: TomlValue::Text { text: drive, .. },
+                span,
+            },
+        )) = find_key(entries, "drive")
+        else {
+            continue;
+        };
+        let delay = delays.iter().find(|(name, _)| name == drive);
+        let Some((_, delay)) = delay.filter(|_| find_key(entries, "delay").is_none()) else {
+            continue;
+        };
+        let line = text[span.end..].split('\n').next().unwrap_or_default();
+        let rest = line.trim();
+        if rest.is_empty() || rest.starts_with('#') {
+            let line_end = if line.ends_with('\r') { "\r\n" } else { "\n" };
+            let at = span.end + line.trim_end_matches('\r').len();
+            edited.insert_str(at, &format!("{line_end}delay = {delay:?}"));
+        } else {
+            // A table on one line.
+            edited.insert_str(span.end, &format!(", delay = {delay:?}"));
+        }
+    }
+    Ok(edited)
 }
 
 /// Writes the vector of gravity, m/s^2, into the text of a model file. It replaces the entry `gravity`; without such an

@@ -86,6 +86,11 @@ impl Model {
         }
         // Gains are no part of the base parameters of bodies.
         adopted.parameters.extend(values.gains);
+        let delays = fit
+            .delays
+            .iter()
+            .map(|delay| (delay.drive.clone(), delay.value.max(0.0)));
+        adopted.delays = delays.collect();
         let text =
             write_identified(self.text(), &adopted).map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
         // The edited text is read again, so that an invalid edit cannot be returned.

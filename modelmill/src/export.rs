@@ -2,7 +2,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::{FitFile, RecordingNote};
+use modelmill_identify::{FitFile, FitParameter, ParameterStatus, RecordingNote};
 use modelmill_spec::LoadedModel;
 
 pub use modelmill_reduction::ExportFormat as Format;
@@ -32,19 +32,22 @@ pub fn description(path: &str, loaded: &LoadedModel, format: Format) -> Outcome<
 }
 
 impl Model {
-    /// Writes the model as a URDF or MJCF, with its nominal values or with the physical parameters of a fit. The text
-    /// in `fit` is only used in messages, as the name of the fit.
+    /// Writes the model as a URDF or MJCF, with its nominal values or with those of a fit: its physical parameters, or base
+    /// parameters and gains if each base parameter is a single parameter. The text in `fit` is only used in messages, as
+    /// the name of the fit.
     ///
-    /// Fails when a fit has base parameters only, since these do not determine single bodies; also in all cases in
+    /// Fails when a fit has sums of parameters only, since these do not determine single bodies; also in all cases in
     /// which [`description`] fails.
     pub fn export(&self, format: Format, fit: Option<(&FitFile, &str)>) -> Outcome<ExportedRobot> {
         let Some((fit, file)) = fit else {
             return description(&self.path, &self.loaded, format);
         };
-        if fit.physical_parameters().is_empty() {
+        if fit.physical_parameters().is_empty() && !self.determines_parameters(fit) {
             return Err(Error::input(message!(
-                "{file} has base parameters only, and simulators need ten parameters of every body; identify with {}",
-                Remedy::option(OptionName::Physical)
+                "{file} has sums of parameters, and simulators need ten parameters of every body; identify with {}, or let the \
+                 bodies be known numbers (import with {}) and identify the rest",
+                Remedy::option(OptionName::Physical),
+                Remedy::option(OptionName::KnownBodies)
             )));
         }
         // The fit is written into the model file first, so that the export uses one source of values.
@@ -52,5 +55,13 @@ impl Model {
         let mut exported = description(&self.path, &adopted.loaded, format)?;
         exported.notes.splice(0..0, adopted.notes);
         Ok(exported)
+    }
+
+    /// Whether each value of a fit is that of a single parameter or of a number of the file.
+    fn determines_parameters(&self, fit: &FitFile) -> bool {
+        let parameters = &self.derivation.mechanism.parameters;
+        let is_single = |one: &FitParameter| parameters.iter().any(|parameter| parameter.name == one.expression);
+        let mut all = fit.parameters.iter();
+        all.all(|one| one.status == ParameterStatus::Known || is_single(one))
     }
 }

@@ -91,6 +91,7 @@ pub(crate) fn import_text(
     text: Option<String>,
     floating: bool,
     round_angles: bool,
+    known_bodies: bool,
     closures: Option<PathBuf>,
     pose: Vec<(String, f64)>,
     locked: Vec<(String, f64)>,
@@ -115,6 +116,7 @@ pub(crate) fn import_text(
         let options = import::Options {
             floating,
             round_angles,
+            known_bodies,
             closures: closures.as_deref(),
             pose: &pose,
             locked: &locked,

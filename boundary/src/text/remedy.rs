@@ -48,6 +48,8 @@ names! {
         Held => "held",
         /// Recordings that serve as instruments.
         Instruments => "instruments",
+        /// Masses and inertias of a robot description are known numbers.
+        KnownBodies => "known_bodies",
         /// Leaves out forces of contacts and pushes.
         LeaveOutEvents => "leave_out_events",
         /// Limits of a motion.

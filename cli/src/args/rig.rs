@@ -46,6 +46,10 @@ pub(crate) struct ImportArgs {
     /// Round angles within 1e-4 rad of a multiple of pi/12, such as 1.5708, to this multiple
     #[arg(long)]
     pub(crate) round_angles: bool,
+    /// Masses and inertias of the description are known numbers. By default they are parameters with nominal values, which
+    /// `identify` estimates
+    #[arg(long)]
+    pub(crate) known_bodies: bool,
     /// Joint values from which loops are closed, rad or m from the description's own zero. They select one of several
     /// assembly modes
     #[arg(long, value_name = "JOINT=VALUE,...", value_parser = parse_value, value_delimiter = ',', allow_hyphen_values = true)]
@@ -67,7 +71,7 @@ pub(crate) struct ImportArgs {
 pub(crate) struct ExportArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Use the values of a fit by `identify --physical` instead of the nominal ones
+    /// Use the values of a fit instead of the nominal ones: by `identify --physical`, or of a model with known bodies
     #[arg(long, value_name = "FIT.json")]
     pub(crate) parameters: Option<PathBuf>,
     /// Format; if not given, determined by the ending of --out (.urdf, .xml)

@@ -23,6 +23,7 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
     let options = Options {
         floating: args.floating,
         round_angles: args.round_angles,
+        known_bodies: args.known_bodies,
         closures: None,
         pose: &args.at,
         locked: &args.lock,
@@ -39,9 +40,14 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
     }
     target.write(&imported.model)?;
     terminal::note(&format!(
-        "{}: {}, with the ten linear parameters of every body; check and correct it",
+        "{}: {}, with {} of every body; check and correct it",
         target.path().display(),
         count(imported.joints.len(), "joint", "joints"),
+        if args.known_bodies {
+            "known masses and inertias"
+        } else {
+            "the ten linear parameters"
+        },
     ));
     Ok(())
 }

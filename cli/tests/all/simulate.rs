@@ -129,3 +129,109 @@ fn faults_have_their_places() {
     let says = refused(2, &["simulate", &rig("spidermill-full.toml"), "--trajectory", &file]);
     assert!(says.contains("--out"), "{says}");
 }
+
+/// The servo arm that MuJoCo simulated moves as its log says, under its commands alone: a wrong force in the log is not used.
+#[test]
+fn commands_move_the_model_whatever_forces_the_log_has() {
+    let arm = scratch("servo_arm.toml");
+    let recordings = workspace("recordings/servo-arm");
+    let description = recordings.join("servo_arm.xml").display().to_string();
+    ran(&["import", &description, "--known-bodies", "--out", &arm]);
+    // What the machine has and the description lacks, see lab/servo-plant/servo_arm.py.
+    let mut text = std::fs::read_to_string(&arm).expect("the model");
+    for (old, new) in [
+        (
+            "shoulder_drive\"]\nparameters = { Fv = { nominal = 0.05",
+            "shoulder_drive\"]\nparameters = { Fv = { nominal = 0.12",
+        ),
+        (
+            "elbow_drive\"]\nparameters = { Fv = { nominal = 0.05",
+            "elbow_drive\"]\nparameters = { Fv = { nominal = 0.06",
+        ),
+        (
+            "shoulder_drive\"]\nparameters = { Ia = { nominal = 0.01",
+            "shoulder_drive\"]\nparameters = { Ia = { nominal = 0.022",
+        ),
+        (
+            "elbow_drive\"]\nparameters = { Ia = { nominal = 0.01",
+            "elbow_drive\"]\nparameters = { Ia = { nominal = 0.014",
+        ),
+        (
+            "signal = \"shoulder_servo\"\n",
+            "signal = \"shoulder_servo\"\ndelay = 0.012\n",
+        ),
+        (
+            "signal = \"elbow_servo\"\n",
+            "signal = \"elbow_servo\"\ndelay = 0.012\n",
+        ),
+    ] {
+        assert!(text.contains(old), "{old} in\n{text}");
+        text = text.replace(old, new);
+    }
+    for (drive, friction) in [("shoulder_drive", 0.15), ("elbow_drive", 0.09)] {
+        let _ = write!(
+            text,
+            "\n[[effect]]\nkind = \"coulomb_friction\"\nat = [\"{drive}\"]\nparameters = {{ Fc = {{ nominal = {friction} }} }}\n"
+        );
+    }
+    std::fs::write(&arm, text).expect("written");
+    let log = std::fs::read_to_string(recordings.join("check.csv")).expect("the log");
+    let with_forces: Vec<String> = (log.lines().enumerate())
+        .map(|(k, line)| {
+            if k == 0 {
+                format!("{line},shoulder_drive,elbow_drive")
+            } else {
+                format!("{line},-5,5")
+            }
+        })
+        .collect();
+    let log = scratch("with-forces.csv");
+    std::fs::write(&log, with_forces.join("\n")).expect("written");
+    let motion = scratch("servo-motion.csv");
+    let told = json(&["simulate", &arm, "--command", &log, "--out", &motion, "--json"]);
+    assert_eq!(told["input"], "commands");
+    let table = |path: &str| -> Vec<Vec<f64>> {
+        let text = std::fs::read_to_string(path).expect("a table");
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split(',').map(|x| x.parse().expect("a number")).collect())
+            .collect()
+    };
+    let (recorded, made) = (table(&log), table(&motion));
+    assert!(made.len() > 1900, "{}", made.len());
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in &made {
+        let sample = recorded
+            .iter()
+            .find(|one| (one[0] - row[0]).abs() < 1e-6)
+            .expect("the sample");
+        sum += (row[1] - sample[1]).powi(2) + (row[2] - sample[2]).powi(2);
+        count += 2.0;
+    }
+    let error = f64::sqrt(sum / count);
+    println!("servo arm under its commands: {error:.2e} rad");
+    assert!(error < 2e-3, "{error}");
+    // Under these forces it leaves the motion of the log.
+    let told = json(&["simulate", &arm, "--data", &log, "--out", &motion, "--json"]);
+    assert_eq!(told["input"], "forces");
+}
+
+#[test]
+fn commands_need_actuators_and_their_signals() {
+    let out = scratch("no-motion.csv");
+    let says = refused(&[
+        "simulate",
+        &model("spidermill.toml"),
+        "--command",
+        &run("plain-check.csv"),
+        "--out",
+        &out,
+    ]);
+    assert!(says.contains("the model has no `[[actuator]]`"), "{says}");
+    let arm = scratch("servo_arm_2.toml");
+    let description = workspace("recordings/servo-arm/servo_arm.xml").display().to_string();
+    ran(&["import", &description, "--known-bodies", "--out", &arm]);
+    let log = scratch("no-commands.csv");
+    std::fs::write(&log, "t,shoulder,elbow\n0,0,0\n0.01,0,0\n0.02,0,0\n").expect("written");
+    let says = refused(&["simulate", &arm, "--command", &log, "--out", &out]);
+    assert!(says.contains("no column for shoulder_servo, elbow_servo"), "{says}");
+}

@@ -96,6 +96,17 @@ pub struct FitGain {
     pub unit: String,
 }
 
+/// An identified delay of the only actuator of a drive.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitDelay {
+    /// Name of the drive.
+    pub drive: String,
+    /// The delay, s.
+    pub value: f64,
+    /// Standard deviation, s.
+    pub std: f64,
+}
+
 /// What the JSON of an identification from signals contains for its readers.
 #[derive(Deserialize)]
 struct SignalFitFile {
@@ -123,6 +134,9 @@ pub struct FitFile {
     /// Gains of actuators, if the fit is from their signals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gains: Vec<FitGain>,
+    /// Delays of actuators, if the fit is from their signals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub delays: Vec<FitDelay>,
     /// Covariance of the values, row by row in the order of `parameters`, in the products of their units; omitted if a
     /// standard deviation is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -24,7 +24,9 @@ use serde::{Deserialize, Serialize};
 pub use equation_sample::EquationSample;
 pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{EstimatorOutput, FitFile, FitGain, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
+pub use fit_file::{
+    EstimatorOutput, FitDelay, FitFile, FitGain, FitParameter, ParameterInfo, ParameterStatus, fit_parameters,
+};
 pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
 pub use residual_by_rate::{DriveResidual, RateDependence, RateTerm, ResidualLevels, find_rate_dependence};
 pub use thresholds::TRIMMED_PART;

@@ -162,6 +162,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         .collect();
     let fit = FitFile {
         gains: Vec::new(),
+        delays: Vec::new(),
         model: "two_link".to_owned(),
         samples: run.samples(),
         condition_number: Some(solution.condition_number),

@@ -213,6 +213,7 @@ pub fn identify(
     Ok(Identification {
         fit: FitFile {
             gains: Vec::new(),
+            delays: Vec::new(),
             model: model.name.clone(),
             samples: fit.samples,
             condition_number: finite(solution.condition_number),

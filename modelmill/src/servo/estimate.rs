@@ -173,7 +173,7 @@ impl ServoModel {
         Ok(ServoIdentification {
             model: self.equations.name.clone(),
             samples,
-            model_fit: self.model_fit(&parameters, &covariance, samples),
+            model_fit: self.model_fit(&parameters, &covariance, &delays, samples),
             parameters,
             scaled_condition_number: Some(solved.solution.scaled_condition_number).filter(|c| c.is_finite()),
             fit: fitted,

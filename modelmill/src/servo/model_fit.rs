@@ -5,10 +5,11 @@
 //! those of the servo equations. Where the signals determine only the sum of a gain and a parameter, such as `kd` and viscous
 //! friction, the gain has its nominal value, or else the complete sum if the gain's product stands for it, or zero.
 
-use modelmill_identify::{ErrorFigures, FitFile, FitGain, FitParameter, ParameterStatus};
+use modelmill_identify::{ErrorFigures, FitDelay, FitFile, FitGain, FitParameter, ParameterStatus};
 use nalgebra::{DMatrix, DVector};
 
 use super::ServoModel;
+use super::delay::ServoDelay;
 use super::estimate::{ServoParameter, ServoStatus};
 use super::gains::{GainProduct, nominal_value, product_of, retaining};
 
@@ -29,6 +30,7 @@ impl ServoModel {
         &self,
         found: &[ServoParameter],
         covariance: &DMatrix<f64>,
+        delays: &[ServoDelay],
         samples: usize,
     ) -> Option<FitFile> {
         let is_absolute = |one: &ServoParameter| {
@@ -99,6 +101,7 @@ impl ServoModel {
             covariance: is_complete.then(|| spread.row_iter().map(|row| row.iter().copied().collect()).collect()),
             parameters,
             gains: fitted_gains.collect(),
+            delays: self.fitted_delays(delays),
             constants: mechanism.constants.iter().map(|c| (c.name.clone(), c.value)).collect(),
             equation_sample: model.equation_sample(),
             undetermined: Vec::new(),
@@ -107,6 +110,24 @@ impl ServoModel {
             data: Vec::new(),
             estimator: modelmill_identify::EstimatorOutput::default(),
         })
+    }
+
+    /// The estimated delays of drives with one actuator.
+    fn fitted_delays(&self, delays: &[ServoDelay]) -> Vec<FitDelay> {
+        let is_estimated = |one: &&ServoDelay| {
+            let own = self
+                .actuators()
+                .iter()
+                .filter(|actuator| self.drive_name(actuator) == one.drive);
+            one.interval.is_some() && !one.is_open && own.count() == 1
+        };
+        let estimated = delays.iter().filter(is_estimated);
+        let fitted = estimated.map(|one| FitDelay {
+            drive: one.drive.clone(),
+            value: one.value,
+            std: one.std,
+        });
+        fitted.collect()
     }
 
     /// The gains of all actuators: their base parameters, less what these contain of other gains.

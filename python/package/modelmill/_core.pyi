@@ -148,6 +148,7 @@ def import_text(
     text: str | None,
     floating: bool,
     round_angles: bool,
+    known_bodies: bool,
     closures: str | PathLike[str] | None,
     pose: list[tuple[str, float]],
     locked: list[tuple[str, float]],

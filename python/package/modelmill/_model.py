@@ -1287,6 +1287,7 @@ def load(
     at_values: bool = False,
     floating: bool = False,
     round_angles: bool = False,
+    known_bodies: bool = False,
     closures: PathText | None = None,
     pose: Mapping[str, float] | None = None,
     locked: Mapping[str, float] | None = None,
@@ -1305,8 +1306,9 @@ def load(
         Libraries with additional kinds of effects.
     at_values : bool
         Derive only for the values of the file: fewer base parameters if the geometry is special.
-    floating, round_angles, closures, pose, locked, joints
-        Only for robot descriptions: whether the base of a URDF is free; whether angles near right ones are rounded; a file of
+    floating, round_angles, known_bodies, closures, pose, locked, joints
+        Only for robot descriptions: whether the base of a URDF is free; whether angles near right ones are rounded; whether
+        masses and inertias are known numbers and not parameters; a file of
         loop closures; joint values that choose the assembly mode; joints that are fixed at a value; the only joints that move.
 
     Returns
@@ -1334,6 +1336,7 @@ def load(
                 text if is_text else None,
                 floating,
                 round_angles,
+                known_bodies,
                 closures,
                 list((pose or {}).items()),
                 list((locked or {}).items()),

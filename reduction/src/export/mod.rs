@@ -69,12 +69,30 @@ impl fmt::Display for ExportError {
 
 impl std::error::Error for ExportError {}
 
+/// The place of a parameter that is a base parameter by itself, by the expression of the base parameter.
+fn parameter_named(mechanism: &Mechanism, expression: &str) -> Option<usize> {
+    mechanism.parameters.iter().position(|one| one.name == expression)
+}
+
+/// The mechanism with the identified values of base parameters that are single parameters as nominal values.
+fn with_identified_parameters(mechanism: &Mechanism) -> Mechanism {
+    let mut mechanism = mechanism.clone();
+    for (expression, value) in mechanism.identified_base.clone() {
+        if let Some(p) = parameter_named(&mechanism, &expression) {
+            let parameter = &mut mechanism.parameters[p];
+            (parameter.nominal, parameter.has_nominal) = (value, true);
+        }
+    }
+    mechanism
+}
+
 /// Writes a mechanism with its nominal values as a robot description.
 ///
 /// Fails if a coordinate moves its joints only by ratios other than one, or a mass has different places in the balances
 /// of forces and of moments.
 pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<DescriptionExport, ExportError> {
     let mut remarks = Vec::new();
+    let mechanism = &with_identified_parameters(mechanism);
     // With loops, bodies are drawn at the nominal pose, where loops are closed; without loops at zero.
     let at: Vec<f64> = match format {
         DescriptionFormat::Mjcf if !mechanism.loops.is_empty() => {
@@ -89,9 +107,13 @@ pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<Descri
     inertia::complete_inertias(&tree, &mut bodies, &mut remarks);
     inertia::report_impossible(&tree, &bodies, &mut remarks);
     // Values of base parameters cannot be distributed to bodies.
-    if !mechanism.identified_base.is_empty() {
+    if mechanism
+        .identified_base
+        .iter()
+        .any(|(expression, _)| parameter_named(mechanism, expression).is_none())
+    {
         remarks.push(message!(
-            "the values under `[identified]` are those of base parameters, which do not determine single bodies, so bodies have \
+            "some values under `[identified]` are those of sums of parameters, which do not determine single bodies, so bodies have \
              their nominal values. For a description of the real machine, identify with {} and write the fit with {}",
             Remedy::option(OptionName::Physical),
             Remedy::command(CommandName::Adopt)

@@ -116,6 +116,8 @@ pub(crate) struct DescriptionJoint {
 /// A controller that is part of a drive: `kp*(command - position) - kd*rate`, or `kd*(command - rate)` without `kp`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct JointServo {
+    /// Name of the actuator, under which simulators record its command; empty if it has none.
+    pub(crate) name: String,
     /// Stiffness, N m/rad or N/m; `None` for a controller of the rate.
     pub(crate) kp: Option<f64>,
     /// Damping, N m s/rad or N s/m.

@@ -328,6 +328,7 @@ impl<'a> MjcfReader<'a> {
         // Unequal limits are those of the drive alone.
         let range = self.limits(node, None, ["forcerange", "forcelimited"])?;
         Ok(Some(JointServo {
+            name: node.attribute("name").unwrap_or_default().to_owned(),
             kp,
             kd,
             delay: self.first(node, None, "delay")?,

@@ -89,6 +89,8 @@ pub struct Options<'a> {
     pub floating: bool,
     /// Whether angles within 1e-4 rad of a multiple of pi/12 are rounded to it.
     pub round_angles: bool,
+    /// Whether masses and inertias are known numbers instead of parameters with nominal values.
+    pub known_bodies: bool,
     /// Text of a `robot.yaml` with closures and drives of a URDF, in the format of the collection
     /// example-parallel-robots.
     pub closures: Option<&'a str>,

@@ -15,6 +15,7 @@ mod locks;
 mod mjcf;
 mod order_of_entries;
 mod propose;
+mod servos;
 mod spidermill;
 mod urdf;
 mod welds;

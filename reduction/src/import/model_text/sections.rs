@@ -162,15 +162,20 @@ impl ModelTextBuilder<'_> {
                 body.mass,
             ];
             // Zeros are written as well: a value that the file does not state counts as unknown.
-            let nominal: Vec<String> = BODY_SYMBOLS
+            let numbers: Vec<String> = BODY_SYMBOLS
                 .iter()
                 .zip(values)
                 .map(|(key, v)| format!("{key} = {}", toml_float(round_to_15_digits(v))))
                 .collect();
+            let numbers = numbers.join(", ");
+            let linear = if self.options.known_bodies {
+                format!("{{ {numbers} }}")
+            } else {
+                format!("{{ all = \"{suffix}\", nominal = {{ {numbers} }} }}")
+            };
             let _ = write!(
                 text,
-                "\n[[part]]\nname = \"{frame}_body\"\non = \"{frame}\"\nlinear = {{ all = \"{suffix}\", nominal = {{ {} }} }}\n",
-                nominal.join(", ")
+                "\n[[part]]\nname = \"{frame}_body\"\non = \"{frame}\"\nlinear = {linear}\n"
             );
         }
     }
@@ -203,7 +208,10 @@ impl ModelTextBuilder<'_> {
                     coordinate.name
                 );
                 if let Some(servo) = &acts.servo {
-                    actuators.push_str(&servo_text(&place, servo));
+                    // The command has the name of the actuator, unless another quantity has it.
+                    let signal = &servo.name;
+                    let is_usable = is_plain_name(signal) && signal != "t" && self.names.insert(signal.clone());
+                    actuators.push_str(&servo_text(&place, servo, is_usable));
                 }
             } else if coordinate.is_driven {
                 self.remarks.push(message!(
@@ -279,7 +287,7 @@ impl ModelTextBuilder<'_> {
 }
 
 /// The actuator of a drive with a controller.
-fn servo_text(drive: &str, servo: &JointServo) -> String {
+fn servo_text(drive: &str, servo: &JointServo, has_own_signal: bool) -> String {
     let mut text = format!("\n[[actuator]]\ndrive = \"{drive}\"\n");
     let _ = match servo.kp {
         Some(kp) => write!(
@@ -290,7 +298,13 @@ fn servo_text(drive: &str, servo: &JointServo) -> String {
         ),
         None => write!(text, "kind = \"velocity_servo\"\nkv = {}\n", toml_float(servo.kd)),
     };
-    let _ = writeln!(text, "delay = {}", toml_float(servo.delay));
+    if has_own_signal {
+        let _ = writeln!(text, "signal = {}", toml_string(&servo.name));
+    }
+    // Descriptions seldom state a delay, and machines have one: it is estimated unless the file gives it.
+    if servo.delay > 0.0 {
+        let _ = writeln!(text, "delay = {}", toml_float(servo.delay));
+    }
     if let Some(limit) = servo.saturation {
         let _ = writeln!(text, "saturation = {}", toml_float(limit));
     }
@@ -304,6 +318,12 @@ fn zero_if_rounding(entry: f64, largest: f64) -> f64 {
     } else {
         entry
     }
+}
+
+/// Whether a name may stand in a model file: letters, digits and `_`, with a letter first.
+fn is_plain_name(name: &str) -> bool {
+    let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    is_word && name.starts_with(|c: char| c.is_ascii_alphabetic())
 }
 
 /// The name of a model: an identifier in lower-case letters.
