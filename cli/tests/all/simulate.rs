@@ -218,20 +218,23 @@ fn commands_move_the_model_whatever_forces_the_log_has() {
 #[test]
 fn commands_need_actuators_and_their_signals() {
     let out = scratch("no-motion.csv");
-    let says = refused(&[
-        "simulate",
-        &model("spidermill.toml"),
-        "--command",
-        &run("plain-check.csv"),
-        "--out",
-        &out,
-    ]);
+    let says = refused(
+        1,
+        &[
+            "simulate",
+            &model("spidermill.toml"),
+            "--command",
+            &run("plain-check.csv"),
+            "--out",
+            &out,
+        ],
+    );
     assert!(says.contains("the model has no `[[actuator]]`"), "{says}");
     let arm = scratch("servo_arm_2.toml");
     let description = workspace("recordings/servo-arm/servo_arm.xml").display().to_string();
     ran(&["import", &description, "--known-bodies", "--out", &arm]);
     let log = scratch("no-commands.csv");
     std::fs::write(&log, "t,shoulder,elbow\n0,0,0\n0.01,0,0\n0.02,0,0\n").expect("written");
-    let says = refused(&["simulate", &arm, "--command", &log, "--out", &out]);
+    let says = refused(1, &["simulate", &arm, "--command", &log, "--out", &out]);
     assert!(says.contains("no column for shoulder_servo, elbow_servo"), "{says}");
 }

@@ -194,7 +194,7 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     page.paragraph([text(match &reduction.method {
         ReductionMethod::Exact { confirmed_at, .. } => format!(
             "At every state, the following columns are linear combinations of retained columns with constant factors, eq. (6). \
-             They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
+             They were found in exact arithmetic; a check at {confirmed_at} other states, with other values of the constants, confirmed them."
         ),
         ReductionMethod::Unreduced => "Columns are not reduced.".to_owned(),
         ReductionMethod::Numeric { least_kept, most_dropped, residual, constant_change, because } => format!(

@@ -320,7 +320,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     if any_linear {
         page.paragraph([text(
             "Lengths of the linear drives and their derivatives with respect to the independent coordinates, the Jacobian J. \
-             Entries not listed are zero, or too long for this list; the programs below show the long ones. \
+             Entries that are zero are not listed; long entries are shown only in the programs below. \
              By the principle of virtual power, J^T f is the generalised force of the independent coordinates.",
         )]);
         page.blocks.push(PageBlock::Equations(lines));

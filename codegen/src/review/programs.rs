@@ -17,8 +17,8 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     let programs = &derivation.programs;
     page.heading("Operations");
     page.paragraph([text(
-        "Arithmetic operations of each calculation that is listed in the section Programs: those of every state, and those that are done \
-         only once, when constants or parameters change (geometry). Sign changes are not counted.",
+        "Arithmetic operations of each calculation: per state, and per change of constants or parameters (geometry). Sign changes are not \
+         counted.",
     )]);
     // Two rows per program: per state, and once per geometry.
     let mut rows = Vec::new();

@@ -271,10 +271,10 @@ pub fn refusal(reason: RejectionReason, has_findings: bool) -> &'static str {
         RejectionReason::NotConfirmedEverywhere => {
             "not confirmed in all parts of the data (near and far from reversals, both halves)"
         }
-        RejectionReason::ExplainsNothing if has_findings => "explains almost nothing in addition to the effects found",
+        RejectionReason::ExplainsNothing if has_findings => "with the effects found, it explains almost nothing",
         RejectionReason::ExplainsNothing => "explains almost none of the error",
         RejectionReason::OnlyNoiseRemains if has_findings => {
-            "not needed in addition to the effects found: it would only fit noise or rounding"
+            "with the effects found, it would only fit noise or rounding"
         }
         RejectionReason::OnlyNoiseRemains => "the residual is only noise or rounding",
         RejectionReason::NotConfirmedByValidation => "not confirmed on the validation run",

@@ -207,7 +207,14 @@ impl DiagnosisFindings {
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("Error after each step, relative to the force (nrms)"));
+        let base = if self.before.identified.is_some() {
+            "estimated"
+        } else {
+            "fixed"
+        };
+        lines.push(style.bold(&format!(
+            "Error after each step, relative to the force (nrms), with {base} base parameters"
+        )));
         // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
             .map(|step| {
@@ -335,7 +342,7 @@ impl DiagnosisFindings {
         let mut columns = vec![
             ("drive", ColumnAlignment::Left),
             ("noise or rounding", ColumnAlignment::Right),
-            ("depends on time, not on motion", ColumnAlignment::Right),
+            ("changes with time at equal motion", ColumnAlignment::Right),
             ("model error", ColumnAlignment::Right),
         ];
         columns.extend(has_removed.then_some(("removed before the fit (disturbances)", ColumnAlignment::Right)));
@@ -474,8 +481,7 @@ impl DiagnosisFindings {
         }
         lines.push(String::new());
         lines.push(style.bold(&format!(
-            "Rejected candidates: {} of {}, with the share of the squared error that each explains alone",
-            rows.len(),
+            "Rejected candidates: {}; those that explain most of the squared error alone",
             all().count()
         )));
         lines.extend(table(

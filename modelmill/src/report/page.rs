@@ -349,10 +349,11 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
 /// Table of all candidates with an explanation of its columns.
 fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p>The table lists the candidates that were tried: kinds of effects and disturbances at the places where they can act (drive, joint, point, body, constant, base, or `force` for all force signals). \
+        "<p>The table lists the candidates that were tried: kinds of effects and disturbances at the places where they can act (drive, joint, point, frame, body, base, a constant of the model file such as a length, or `force` for all force signals). \
          <i>squared error explained if added alone</i>: the share of the squared error of the given model that the candidate \
          removes without any other effect. <i>gain in addition to the effects found</i>: the share of the squared residual that \
-         the candidate removes if it is added to the model with these effects. For an effect that was found, all other effects found are added \
+         the candidate removes if it is added to the model with these effects; where the residual is only noise or rounding, a large \
+         share means nothing. For an effect that was found, all other effects found are added \
          first.\
          <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)

@@ -29,7 +29,7 @@ pub(super) fn check_positions(
             continue;
         };
         let horizon = own.horizon.unwrap_or(VERIFIED_HORIZON_S);
-        if compared.iter().all(|(other, _)| *other != horizon) {
+        if compared.iter().all(|(other, _)| other.total_cmp(&horizon).is_ne()) {
             let found = match model.compare_over(&[recording], &model.values, &[horizon]) {
                 Err(Error::Cancelled) => return Err(Error::Cancelled),
                 Err(error) => Err(error.to_string()),
@@ -51,7 +51,7 @@ pub(super) fn check_positions(
             says: String::new(),
             cause: None,
         };
-        match compared.iter().find(|(other, _)| *other == horizon) {
+        match compared.iter().find(|(other, _)| other.total_cmp(&horizon).is_eq()) {
             Some((_, Ok(found))) => evaluate(&mut check, found, k, limit),
             Some((_, Err(reason))) => {
                 check.says = format!("the motion of {} could not be simulated: {reason}", check.at);

@@ -305,7 +305,7 @@ impl<'a> MjcfReader<'a> {
         if is_second {
             reasons.push("another actuator acts on the same joint");
         }
-        if gear != 1.0 {
+        if (gear - 1.0).abs() > 0.0 {
             reasons.push("its gear is not 1, so that its command is no position of the joint");
         }
         if self.first(node, None, "timeconst")? != 0.0 {
@@ -332,7 +332,9 @@ impl<'a> MjcfReader<'a> {
             kp,
             kd,
             delay: self.first(node, None, "delay")?,
-            saturation: range.filter(|[low, high]| *low == -*high).map(|[_, high]| high),
+            saturation: range
+                .filter(|[low, high]| is_opposite(*low, *high))
+                .map(|[_, high]| high),
         }))
     }
 
@@ -357,9 +359,9 @@ impl<'a> MjcfReader<'a> {
         let [constant, stiffness, damping] = [0, 1, 2].map(|k| at(&bias, k));
         Ok(if constant != 0.0 {
             None
-        } else if gain == -stiffness {
+        } else if is_opposite(gain, stiffness) {
             Some([Some(gain), Some(-damping)])
-        } else if stiffness == 0.0 && gain == -damping {
+        } else if stiffness == 0.0 && is_opposite(gain, damping) {
             Some([None, Some(gain)])
         } else {
             None
@@ -420,4 +422,9 @@ fn clamp_range(first: Option<[f64; 2]>, then: Option<[f64; 2]>) -> Option<[f64; 
 fn scale_range([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
     let ends = [low * factor, high * factor];
     [ends[0].min(ends[1]), ends[0].max(ends[1])]
+}
+
+/// Whether two numbers of a file have the same size and opposite signs.
+fn is_opposite(one: f64, other: f64) -> bool {
+    (one + other).abs() <= 1e-12 * one.abs()
 }

@@ -178,7 +178,7 @@ impl TourText {
             ("result", ColumnAlignment::Left),
         ];
         self.line(
-            "Share of the squared error that each candidate explains if added alone, and the result of the search:",
+            "The candidates that explain most of the squared error if added alone, and the result of the search:",
         );
         self.lines(&table(2, &columns, &rows));
         self.line("");
@@ -233,7 +233,7 @@ impl TourText {
         if let Some(after) = findings.after.version()
             && let Some(result) = &after.identified
         {
-            self.line("Base parameters of the completed model, identified from the recording:");
+            self.line("Base parameters of the completed model, identified from the first recording:");
             self.lines(&tables::expressions(2, &after.model));
             self.line("");
             self.lines(&tables::parameters(&result.fit.parameters));
@@ -248,6 +248,7 @@ impl TourText {
 
     /// Errors on the validation run as logarithmic bars, down to the noise floor.
     fn bars(&mut self, findings: &DiagnosisFindings) {
+        let is_fitted = findings.before.identified.is_some();
         let (steps, noise) = (&findings.diagnosis.steps, findings.diagnosis.noise_floor);
         let channels = findings.channels();
         let largest = steps.iter().map(|step| step.check).fold(noise, f64::max);
@@ -288,10 +289,14 @@ impl TourText {
         }
         self.line("");
         self.paragraph(&format!(
-            "Error on the validation run, relative to the force (nrms), on a logarithmic scale. The last line ({}) is \
-             the error of a fit to both recordings together. The lines above are from a fit to the first recording alone, so their \
-             error on the validation run is larger.",
-            words::floor_label(noise)
+            "Error on the validation run, relative to the force (nrms), on a logarithmic scale. The last line is the error \
+             that {} alone causes, computed from both recordings; no model has clearly less.{}",
+            words::floor_label(noise),
+            if is_fitted {
+                " Base parameters are estimated in all lines, also for the given model."
+            } else {
+                ""
+            }
         ));
     }
 
