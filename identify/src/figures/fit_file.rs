@@ -151,8 +151,7 @@ pub struct FitFile {
     /// Directions that the recording does not determine, one sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<String>,
-    /// Error figures on the recordings of the fit; none in a fit from signals.
-    #[serde(default)]
+    /// Error figures on the recordings of the fit; no samples in a fit from signals.
     pub fit: ErrorFigures,
     /// Error figures on the validation runs, if any.
     pub check: Option<ErrorFigures>,

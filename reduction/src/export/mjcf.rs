@@ -315,8 +315,8 @@ impl MjcfWriter<'_> {
             let mut limits = m.limits.forces.iter();
             let range = limits.find(|(i, _)| Some(i.0) == d).map(|(_, range)| *range);
             if let Some(servo) = d.and_then(|d| self.servo_attributes(d, range)) {
-                let (element, attributes) = servo;
-                lines.push(format!("<{element} name=\"{}\" {on}{attributes}/>", drive.name));
+                let (element, name, attributes) = servo;
+                lines.push(format!("<{element} name=\"{name}\" {on}{attributes}/>"));
                 continue;
             }
             // The control of a motor is its force, so that limits of the force are its range.
@@ -335,8 +335,9 @@ impl MjcfWriter<'_> {
         });
     }
 
-    /// Element and attributes of the controller of a drive; `None` for a motor. What MJCF cannot express is reported.
-    fn servo_attributes(&mut self, drive: usize, range: Option<[f64; 2]>) -> Option<(&'static str, String)> {
+    /// Element, name and attributes of the controller of a drive; `None` for a motor. Its name is that of its command if the
+    /// model gives one. What MJCF cannot express is reported.
+    fn servo_attributes(&mut self, drive: usize, range: Option<[f64; 2]>) -> Option<(&'static str, String, String)> {
         let m = self.mechanism;
         let name = &m.drives[drive].name;
         let own: Vec<&ModelActuator> = m.actuators.iter().filter(|one| one.drive.0 == drive).collect();
@@ -402,7 +403,9 @@ impl MjcfWriter<'_> {
                     .push(message!("the {what} of the servo of `{name}` is left out"));
             }
         }
-        Some((element, text))
+        let has_usual_name = actuator.signal == format!("{name}_command");
+        let name = if has_usual_name { name } else { &actuator.signal };
+        Some((element, name.clone(), text))
     }
 
     /// Whether a joint moves with a coordinate.

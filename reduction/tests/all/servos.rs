@@ -100,13 +100,9 @@ fn an_exported_servo_is_read_again() {
         .find(|line| line.contains("<position"))
         .unwrap()
         .trim();
-    assert_eq!(
-        servo,
-        r#"<position name="q_drive" joint="q" kp="20" kv="0.4" forcerange="-3 3" delay="0.01" nsample="6"/>"#
-    );
+    assert_eq!(servo, text);
     let again = import(&exported.text, &ImportOptions::default()).unwrap().model;
-    assert_eq!(actuator(&again)[1..4], actuator(&model)[1..4]);
-    assert_eq!(actuator(&again)[5..], actuator(&model)[5..]);
+    assert_eq!(actuator(&again), actuator(&model));
 }
 
 /// What MJCF has no word for is said.
