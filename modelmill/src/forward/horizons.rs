@@ -87,7 +87,7 @@ impl Model {
             };
             let horizons = all.into_iter().map(one).collect::<Outcome<Vec<_>>>()?;
             Ok(ForwardComparison {
-                input: SimulationInput::of(&segments),
+                input: SimulationInput::from_segments(&segments),
                 coordinates: self.active_coordinates(),
                 is_angle: self
                     .active_coordinate_types()

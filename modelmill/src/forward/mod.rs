@@ -45,7 +45,7 @@ impl SimulationInput {
     }
 
     /// What drives the simulations of some segments.
-    fn of(segments: &[&RecordingSegment]) -> Self {
+    fn from_segments(segments: &[&RecordingSegment]) -> Self {
         let computed = segments.iter().filter_map(|one| one.computed.as_deref());
         let mut actuators = computed.flat_map(|one| &one.actuators).peekable();
         if actuators.peek().is_none() {
@@ -146,7 +146,7 @@ impl Model {
             q: found.q,
             qd: found.qd,
             forces: self.row_names().into_iter().zip(forces).collect(),
-            input: SimulationInput::of(&[segment]),
+            input: SimulationInput::from_segments(&[segment]),
         })
     }
 

@@ -1,7 +1,7 @@
 //! What the forces of a recording depend on if they were computed from the signals of actuators and not measured.
 
 use super::RecordingSegment;
-use crate::servo::simulated::SimulatedActuator;
+use super::simulated_actuator::SimulatedActuator;
 
 /// Forces of a recording that were computed from signals.
 #[derive(Clone, Debug, Default)]

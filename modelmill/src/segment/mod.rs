@@ -3,6 +3,7 @@
 
 pub(crate) mod computed_forces;
 pub(crate) mod picked_states;
+pub(crate) mod simulated_actuator;
 pub mod variances;
 
 use std::sync::Arc;

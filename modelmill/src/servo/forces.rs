@@ -19,7 +19,6 @@ use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::{GainValues, delay_phrase};
 use super::refine::refine_delays;
-use super::simulated::SimulatedActuator;
 use super::suspects::{ServoLimit, servo_limits};
 use super::thresholds::{CERTAIN_LIMIT_SHARE, DELAY_STEP, FEWEST_DECIMATED};
 use super::turns::{turn_offset, turn_sentence};
@@ -30,6 +29,7 @@ use crate::progress::SilentProgress;
 use crate::recording::{PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation, UnpreparedRecording};
 use crate::segment::RecordingSegment;
 use crate::segment::computed_forces::{ComputedForces, DelaySensitivity};
+use crate::segment::simulated_actuator::{SimulatedActuator, interpolate_at};
 use crate::text::table::significant;
 
 /// Rounds in which limits and delays of servos are estimated in turn.
@@ -404,7 +404,9 @@ impl<'a> ActuatorForces<'a> {
                 });
                 let delayed = |column: &[f64], times: &[f64]| interpolate(times, column, &time, delay.value);
                 let signals = [delayed(&signal, &time), delayed(&motion.signal_rates[k], &motion.time)];
-                let simulated = SimulatedActuator::new(self.model, actuator, &self.gains, signals);
+                let constants = &mechanism.constants;
+                let slopes = actuator.slopes(&|c| constants[c].value, &|term| self.gains.term_value(term));
+                let simulated = SimulatedActuator::new(actuator, slopes, signals);
                 computed.actuators.push(simulated);
                 phrases.push(self.phrase(actuator, delay));
             }
@@ -611,34 +613,9 @@ impl SmoothMotion {
     }
 }
 
-/// A column at some times less a delay: between its samples the cubic polynomial through the four nearest, and constant
-/// beyond its ends. A line would cut the curves of a command: at 200 Hz and 4 Hz by more than the noise of an encoder.
+/// A column at some times less a delay, see [`interpolate_at`].
 fn interpolate(time: &[f64], column: &[f64], times: &[f64], delay: f64) -> Vec<f64> {
     times.iter().map(|t| interpolate_at(time, column, t - delay)).collect()
-}
-
-/// A column at one time, as [`interpolate`] computes it.
-pub(super) fn interpolate_at(time: &[f64], column: &[f64], t: f64) -> f64 {
-    let last = time.len().saturating_sub(1);
-    if last == 0 || t <= time[0] {
-        return column.first().copied().unwrap_or(0.0);
-    }
-    if t >= time[last] {
-        return column[last];
-    }
-    let b = time.partition_point(|x| *x < t).clamp(1, last);
-    let nearest = b.saturating_sub(2)..(b + 2).min(last + 1);
-    lagrange(&time[nearest.clone()], &column[nearest], t)
-}
-
-/// The polynomial through some points at a time. Points with equal times are no polynomial: the first value counts.
-fn lagrange(time: &[f64], values: &[f64], t: f64) -> f64 {
-    let basis = |k: usize| -> f64 {
-        let others = time.iter().enumerate().filter(|(j, _)| *j != k);
-        others.map(|(_, other)| (t - other) / (time[k] - other)).product()
-    };
-    let sum: f64 = values.iter().enumerate().map(|(k, value)| value * basis(k)).sum();
-    if sum.is_finite() { sum } else { values[0] }
 }
 
 /// What the force of one actuator depends on, by sample.

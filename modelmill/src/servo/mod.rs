@@ -18,7 +18,6 @@ mod model_fit;
 mod refine;
 mod rows;
 mod scale;
-pub(crate) mod simulated;
 mod suspects;
 mod thresholds;
 mod turns;
