@@ -60,7 +60,7 @@ impl Model {
         runs: [&[Vec<&Path>]; 2],
         reading: &RecordingOptions,
     ) -> [Vec<Outcome<PreparedRecording>>; 2] {
-        let read = |paths: &Vec<&Path>| self.without_measured_forces(self.read_recording(paths, reading)?);
+        let read = |paths: &Vec<&Path>| self.without_measured_forces(&self.read_recording(paths, reading)?);
         let read = runs.map(|runs| runs.iter().map(read).collect());
         self.prepare_together(self.add_actuator_forces(read))
     }
@@ -68,7 +68,7 @@ impl Model {
     /// A recording without the measured forces of drives with actuators.
     ///
     /// Fails when the model has no actuators, or the recording lacks their signals.
-    fn without_measured_forces(&self, recording: UnpreparedRecording) -> Outcome<UnpreparedRecording> {
+    fn without_measured_forces(&self, recording: &UnpreparedRecording) -> Outcome<UnpreparedRecording> {
         let mechanism = &self.derivation.mechanism;
         if mechanism.actuators.is_empty() {
             return Err(Error::input(format!(

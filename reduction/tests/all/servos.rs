@@ -2,6 +2,7 @@
 //! express are named. That the gains mean the same is shown by the motion of `recordings/servo-arm`, which MuJoCo simulated.
 
 use modelmill_boundary::files::DiskFiles;
+use modelmill_boundary::text::Message;
 use modelmill_reduction::{ExportFormat, ImportOptions, export, import};
 use modelmill_spec::Mechanism;
 
@@ -24,7 +25,7 @@ fn mechanism(text: &str) -> Mechanism {
 /// The model file and the remarks of an import.
 fn imported(actuators: &str) -> (String, String) {
     let found = import(&arm(actuators), &ImportOptions::default()).unwrap();
-    let remarks: Vec<String> = found.remarks.iter().map(|one| one.in_library_words()).collect();
+    let remarks: Vec<String> = found.remarks.iter().map(Message::in_library_words).collect();
     (found.model, remarks.join("\n"))
 }
 
@@ -111,7 +112,7 @@ fn a_dead_band_and_an_unknown_gain_are_named() {
     let (model, _) = imported(r#"<position joint="q" kp="20" kv="0.4"/>"#);
     let with_band = model.replace("kd = 0.4\n", "kd = 0.4\ndead_band = 0.01\n");
     let exported = export(&mechanism(&with_band), ExportFormat::Mjcf).unwrap();
-    let remarks: Vec<String> = exported.remarks.iter().map(|one| one.in_library_words()).collect();
+    let remarks: Vec<String> = exported.remarks.iter().map(Message::in_library_words).collect();
     assert!(remarks.iter().any(|one| one.contains("dead band")), "{remarks:?}");
     let unknown = model.replace("kp = 20.0", "kp = \"kp\"");
     let unknown = unknown.replace(
@@ -120,7 +121,7 @@ fn a_dead_band_and_an_unknown_gain_are_named() {
     );
     let exported = export(&mechanism(&unknown), ExportFormat::Mjcf).unwrap();
     assert!(exported.text.contains("<motor"), "{}", exported.text);
-    let remarks: Vec<String> = exported.remarks.iter().map(|one| one.in_library_words()).collect();
+    let remarks: Vec<String> = exported.remarks.iter().map(Message::in_library_words).collect();
     assert!(
         remarks.iter().any(|one| one.contains("no nominal value")),
         "{remarks:?}"
@@ -142,6 +143,6 @@ fn known_bodies_have_numbers_and_identified_friction_is_exported() {
     let adopted = model + "\n[identified]\nbase = [{ expression = \"Fv_q_drive\", value = 0.25 }]\n";
     let exported = export(&mechanism(&adopted), ExportFormat::Mjcf).unwrap();
     assert!(exported.text.contains(r#"damping="0.25""#), "{}", exported.text);
-    let remarks: Vec<String> = exported.remarks.iter().map(|one| one.in_library_words()).collect();
+    let remarks: Vec<String> = exported.remarks.iter().map(Message::in_library_words).collect();
     assert!(!remarks.iter().any(|one| one.contains("[identified]")), "{remarks:?}");
 }
