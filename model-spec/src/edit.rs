@@ -180,7 +180,8 @@ pub struct AdoptedValues {
     pub delays: Vec<(String, f64)>,
 }
 
-/// Writes identified values into the text of a model file and replaces earlier ones; everything else stays unchanged.
+/// Writes identified values into the text of a model file and replaces earlier ones, except for delays that the file has;
+/// everything else stays unchanged.
 ///
 /// Fails if the text is not TOML, or if its table `identified` has another form than this function writes.
 ///
@@ -245,7 +246,7 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
     Ok(kept + &identified_table(values, line_end))
 }
 
-/// Writes delays into the actuators of some drives that have none.
+/// Writes delays into the actuators of some drives that have none. A delay of the file is kept.
 ///
 /// Fails if the text is not TOML.
 fn write_delays(text: &str, delays: &[(String, f64)]) -> Result<String, String> {
@@ -295,7 +296,10 @@ fn write_delays(text: &str, delays: &[(String, f64)]) -> Result<String, String> 
             edited.insert_str(span.end, &format!(", delay = {delay:?}"));
         }
     }
-    Ok(edited)
+    // An inline table over several lines is left as it is.
+    let mut log = DiagnosticLog::default();
+    document::parse_toml(&edited, 0, &mut log);
+    Ok(if log.n_errors() > 0 { text.to_owned() } else { edited })
 }
 
 /// Writes the vector of gravity, m/s^2, into the text of a model file. It replaces the entry `gravity`; without such an

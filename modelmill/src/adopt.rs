@@ -84,8 +84,16 @@ impl Model {
                 adopted.parameters.push((name, value));
             }
         }
-        // Gains are no part of the base parameters of bodies.
-        adopted.parameters.extend(values.gains);
+        // Gains are no part of the base parameters of bodies. An assumed gain is written only if the file has no value.
+        let parameters = &self.loaded.mechanism.parameters;
+        let has_nominal = |name: &str| parameters.iter().any(|one| one.name == name && one.has_nominal);
+        let gains = fit
+            .gains
+            .iter()
+            .filter(|gain| gain.std.is_some() || !has_nominal(&gain.name));
+        adopted
+            .parameters
+            .extend(gains.map(|gain| (gain.name.clone(), gain.value)));
         let delays = fit
             .delays
             .iter()

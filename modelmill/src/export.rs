@@ -57,10 +57,12 @@ impl Model {
         Ok(exported)
     }
 
-    /// Whether each value of a fit is that of a single parameter or of a number of the file.
+    /// Whether each value of a fit is that of a parameter of an effect or of a number of the file.
     fn determines_parameters(&self, fit: &FitFile) -> bool {
-        let parameters = &self.derivation.mechanism.parameters;
-        let is_single = |one: &FitParameter| parameters.iter().any(|parameter| parameter.name == one.expression);
+        let mechanism = &self.derivation.mechanism;
+        let terms = || mechanism.effects.iter().flat_map(|effect| &effect.terms);
+        let is_single =
+            |one: &FitParameter| terms().any(|term| mechanism.parameters[term.parameter.0].name == one.expression);
         let mut all = fit.parameters.iter();
         all.all(|one| one.status == ParameterStatus::Known || is_single(one))
     }

@@ -90,7 +90,7 @@ pub struct FitGain {
     pub name: String,
     /// The value.
     pub value: f64,
-    /// Standard deviation; `null` for a value that was not identified.
+    /// Standard deviation; `null` for a value that was assumed, since the signals determine only its sum with a parameter.
     pub std: Option<f64>,
     /// Unit of the value.
     pub unit: String,
@@ -112,8 +112,8 @@ pub struct FitDelay {
 struct SignalFitFile {
     /// `signals`.
     source: String,
-    /// The fit of the model without actuators; absent if only ratios are known.
-    model_fit: Option<FitFile>,
+    /// The fit of the model without actuators; `null` if only ratios are known.
+    model_fit: serde_json::Value,
 }
 
 /// A fit read from the JSON file that `identify` writes, or to be written to it: values and standard deviations of all
@@ -275,9 +275,21 @@ impl FitFile {
         if let Ok(signals) = serde_json::from_str::<SignalFitFile>(text)
             && signals.source == "signals"
         {
-            return signals.model_fit.ok_or_else(|| FitFileError {
+            let fault = if signals.model_fit.is_null() {
+                FitFault::OnlyRatios
+            } else {
+                match serde_json::from_value(signals.model_fit) {
+                    Ok(fit) => return Ok(fit),
+                    Err(error) => FitFault::NotAFit {
+                        line: 1,
+                        column: 1,
+                        reason: format!("`model_fit`: {error}"),
+                    },
+                }
+            };
+            return Err(FitFileError {
                 file: file.to_owned(),
-                fault: FitFault::OnlyRatios,
+                fault,
             });
         }
         serde_json::from_str(text).map_err(|error| {

@@ -170,7 +170,10 @@ fn windows(segment: &RecordingSegment, seconds: f64) -> Vec<[usize; 2]> {
         if end >= n {
             break;
         }
-        all.push([start, end]);
+        // A window of its first state alone compares nothing.
+        if end > start + 1 {
+            all.push([start, end]);
+        }
         start = end;
     }
     // Many windows are thinned out evenly.

@@ -8,7 +8,7 @@ pub(super) const LONGEST_STEP_S: f64 = 1e-3;
 /// order is then 0.3^5/120 = 2e-5.
 pub(super) const STEP_OF_SERVO: f64 = 0.3;
 
-/// Shortest step of the integration, s. By judgement: a servo that is faster than 50 kHz is a wrong gain.
+/// Shortest step of the integration, s. By judgement: a servo with a rate above 6e4 1/s has a wrong gain.
 pub(super) const SHORTEST_STEP_S: f64 = 5e-6;
 
 /// Reversals of drives that are located within one step; more are passed over. By judgement.

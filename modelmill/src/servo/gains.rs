@@ -88,8 +88,13 @@ impl GainValues {
                         fixing_clause(servo, k),
                     )));
                 }
+                let mechanism = &servo.model.loaded.mechanism;
                 let known = servo.equations.products_of(k).into_iter().skip(1);
-                let known = known.filter_map(|(other, factor)| Some(factor * self.values.get(&other.0)?));
+                let known = known.filter_map(|(other, factor)| {
+                    let gain = self.values.get(&other.0).copied();
+                    // The model applies the nominal value of its friction itself.
+                    Some(factor * gain.or_else(|| nominal_value(mechanism, &other.0))?)
+                });
                 value = parameter.value - known.sum::<f64>();
             }
             self.values.insert(product, value);

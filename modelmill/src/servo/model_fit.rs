@@ -3,7 +3,8 @@
 //!
 //! Base parameters of both are sums of products of parameters. With values of the gains, those of the model are linear in
 //! those of the servo equations. Where the signals determine only the sum of a gain and a parameter, such as `kd` and viscous
-//! friction, the gain has its nominal value, or else the complete sum if the gain's product stands for it, or zero.
+//! friction, the gain is assumed: it has its nominal value, or what the nominal value of the parameter leaves of the sum, or
+//! else zero. The parameter is the rest, with the uncertainty of the sum.
 
 use modelmill_identify::{ErrorFigures, FitDelay, FitFile, FitGain, FitParameter, ParameterStatus};
 use nalgebra::{DMatrix, DVector};
@@ -41,7 +42,7 @@ impl ServoModel {
         }
         let model = &self.model;
         let values = DVector::from_iterator(found.len(), found.iter().map(|one| one.value));
-        let gains = self.gain_relation();
+        let gains = self.gain_relation(&values);
         let gain_values = &gains.select * &values + &gains.constant;
         let (bodies, of_gains) = self.relation(&gains.products)?;
         let total = &bodies * (DMatrix::identity(found.len(), found.len()) - &of_gains * &gains.select);
@@ -84,6 +85,13 @@ impl ServoModel {
             let [(p, 1)] = product.as_slice() else {
                 return None;
             };
+            // A gain that the recordings do not determine has no value.
+            let is_open = |(k, one): (usize, &ServoParameter)| {
+                one.status == ServoStatus::Undetermined && gains.select[(g, k)] != 0.0
+            };
+            if found.iter().enumerate().any(is_open) {
+                return None;
+            }
             let row = gains.select.row(g);
             let variance = (row * covariance * row.transpose())[(0, 0)];
             Some(FitGain {
@@ -119,7 +127,11 @@ impl ServoModel {
                 .actuators()
                 .iter()
                 .filter(|actuator| self.drive_name(actuator) == one.drive);
-            one.interval.is_some() && !one.is_open && own.count() == 1
+            // An interval as wide as the delay itself determines nothing.
+            let is_known = one
+                .interval
+                .is_some_and(|[low, high]| low > 0.0 && high - low < one.value);
+            is_known && !one.is_open && own.count() == 1
         };
         let estimated = delays.iter().filter(is_estimated);
         let fitted = estimated.map(|one| FitDelay {
@@ -131,7 +143,7 @@ impl ServoModel {
     }
 
     /// The gains of all actuators: their base parameters, less what these contain of other gains.
-    fn gain_relation(&self) -> GainRelation {
+    fn gain_relation(&self, values: &DVector<f64>) -> GainRelation {
         let mut products: Vec<GainProduct> = Vec::new();
         for term in self.actuators().iter().flat_map(|actuator| &actuator.terms) {
             let product = product_of(term);
@@ -153,11 +165,20 @@ impl ServoModel {
                 let k = retaining(self, product)?;
                 let others = self.equations.products_of(k);
                 let is_shared = others.iter().any(|(other, _)| !is_gain(&other.0));
-                (!is_shared || nominal_value(mechanism, product).is_none()).then_some(k)
+                (!is_shared).then_some(k)
             })
             .collect();
+        // An assumed gain that stands for a sum is what nominal values of the other parameters leave of it.
+        let remainder = |product: &GainProduct| -> Option<f64> {
+            let k = retaining(self, product)?;
+            let others = self.equations.products_of(k).into_iter().skip(1);
+            let nominal = others.map(|(other, factor)| Some(factor * nominal_value(mechanism, &other.0)?));
+            Some((values[k] - nominal.sum::<Option<f64>>()?).max(0.0))
+        };
         for (g, _) in sources.iter().enumerate().filter(|(_, source)| source.is_none()) {
-            gains.constant[g] = nominal_value(mechanism, &gains.products[g]).unwrap_or(0.0);
+            let product = &gains.products[g];
+            let assumed = nominal_value(mechanism, product).or_else(|| remainder(product));
+            gains.constant[g] = assumed.unwrap_or(0.0);
         }
         for (g, k) in sources.iter().enumerate().filter_map(|(g, k)| Some((g, (*k)?))) {
             gains.select[(g, k)] = 1.0;

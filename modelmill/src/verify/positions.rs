@@ -52,7 +52,7 @@ pub(super) fn check_positions(
             cause: None,
         };
         match compared.iter().find(|(other, _)| other.total_cmp(&horizon).is_eq()) {
-            Some((_, Ok(found))) => evaluate(&mut check, found, k, limit),
+            Some((_, Ok(found))) => evaluate(&mut check, found, k, [limit, horizon]),
             Some((_, Err(reason))) => {
                 check.says = format!("the motion of {} could not be simulated: {reason}", check.at);
             }
@@ -67,7 +67,7 @@ pub(super) fn check_positions(
 }
 
 /// Compares the position error of a coordinate over its horizon with its limit.
-fn evaluate(check: &mut VerificationCheck, found: &ForwardComparison, k: usize, limit: f64) {
+fn evaluate(check: &mut VerificationCheck, found: &ForwardComparison, k: usize, [limit, horizon]: [f64; 2]) {
     // The first horizon is the requested one, or the whole run if that is shorter.
     let Some(one) = found.horizons.first() else {
         return;
@@ -83,8 +83,24 @@ fn evaluate(check: &mut VerificationCheck, found: &ForwardComparison, k: usize, 
         );
         return;
     }
+    if one.is_whole_run && one.seconds < horizon {
+        check.says = format!(
+            "the recording of {} s is shorter than the horizon of {} s",
+            significant(one.seconds, 3),
+            significant(horizon, 3)
+        );
+        return;
+    }
+    if one.ended_early > 0 {
+        check.state = CheckState::Fail;
+        check.says = format!(
+            "{} of {} simulations of {at} over {over} left the reach of the mechanism",
+            one.ended_early, one.windows
+        );
+        return;
+    }
     let Some(value) = one.rms.as_ref().map(|all| all[k]).filter(|value| value.is_finite()) else {
-        check.says = format!("no simulation of {at} over {over} reached its end within the reach of the mechanism");
+        check.says = format!("no simulation of {at} over {over} has a sample to compare");
         return;
     };
     check.state = if value <= limit {

@@ -41,6 +41,7 @@ fn values(model: &Model, planted: &Planted) -> Vec<f64> {
         "ml" => planted.ml,
         "Fv_motor" => planted.viscous,
         "Fc_motor" => planted.coulomb,
+        "1" => 1.0,
         other => panic!("{other}"),
     };
     model.base.iter().map(|base| value(&base.expression)).collect()
@@ -149,6 +150,37 @@ fn a_nominal_gain_separates_its_friction() {
         (viscous.value - PLANTED.viscous).abs() < 3.0 * std.max(0.005),
         "{viscous:?}"
     );
+}
+
+/// The friction of the file is not a part of the gain that is identified with it.
+#[test]
+fn a_gain_without_a_value_leaves_out_the_friction_of_the_file() {
+    let log = simulate_limited(&PLANTED, UNLIMITED, 1, 6000);
+    let friction = "kind = \"viscous_friction\"\nat = \"motor\"\n";
+    let text = pendulum(&[("ml", 0.15), ("kp", 20.0)]).replace(
+        friction,
+        &format!("{friction}parameters = {{ Fv = {{ nominal = 0.2 }} }}\n"),
+    );
+    let planted = Planted {
+        kd: 0.25,
+        viscous: 0.2,
+        ..PLANTED
+    };
+    let unknown = model(&text);
+    let run = prepare(&unknown, log.clone());
+    let compared = unknown.compare(&[&run], &values(&unknown, &planted)).unwrap();
+    let error = compared.figures.nrms.unwrap();
+    assert!(error < 0.06, "{error}");
+    // A fit has the same gain, and the friction with the uncertainty of the sum.
+    let fit = Host::new().fit_of_text(&fit_text(&text, &log), "fit.json").unwrap();
+    let kd = &fit.gains[0];
+    assert!((kd.value - 0.25).abs() < 0.02 && kd.std.is_none(), "{kd:?}");
+    let viscous = fit.parameters.iter().find(|one| one.expression == "Fv_motor").unwrap();
+    assert!(
+        (viscous.value - 0.2).abs() < 1e-9 && viscous.std.is_some_and(|std| std > 0.0),
+        "{viscous:?}"
+    );
+    assert!(fit.covariance.is_some());
 }
 
 #[test]

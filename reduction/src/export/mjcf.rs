@@ -386,13 +386,21 @@ impl MjcfWriter<'_> {
             (Some([a, b]), Some([c, d])) => Some([a.max(c), b.min(d)]),
             (one, other) => one.or(other),
         };
-        if let Some([low, high]) = limit {
+        if let Some([low, high]) = limit.filter(|[low, high]| low < high) {
             let _ = write!(text, " forcerange=\"{} {}\"", number_text(low), number_text(high));
         }
         if let Some(delay) = actuator.delay.filter(|delay| *delay > 0.0) {
-            // The buffer of the usual step of 2 ms holds the delay.
-            let samples = (delay / 0.002).ceil() + 1.0;
-            let _ = write!(text, " delay=\"{}\" nsample=\"{samples}\"", number_text(delay));
+            // The buffer holds the delay for steps down to 0.1 ms, and the delay is no multiple of the step.
+            let samples = (delay / 1e-4).ceil() + 1.0;
+            let _ = write!(
+                text,
+                " delay=\"{}\" nsample=\"{samples}\" interp=\"linear\"",
+                number_text(delay)
+            );
+            let needs = "a delay of a servo needs MuJoCo 4 and a time step of at least 0.1 ms".into();
+            if !self.remarks.contains(&needs) {
+                self.remarks.push(needs);
+            }
         }
         for (what, is_there) in [
             ("dead band", actuator.dead_band.is_some()),

@@ -69,12 +69,15 @@ impl fmt::Display for ExportError {
 
 impl std::error::Error for ExportError {}
 
-/// The place of a parameter that is a base parameter by itself, by the expression of the base parameter.
+/// The place of a parameter of an effect that is a base parameter by itself, by the expression of the base parameter.
+/// Parameters of bodies are left out: a body needs all ten of them from one source.
 fn parameter_named(mechanism: &Mechanism, expression: &str) -> Option<usize> {
-    mechanism.parameters.iter().position(|one| one.name == expression)
+    let terms = mechanism.effects.iter().flat_map(|effect| &effect.terms);
+    let mut places = terms.map(|term| term.parameter.0);
+    places.find(|p| mechanism.parameters[*p].name == expression)
 }
 
-/// The mechanism with the identified values of base parameters that are single parameters as nominal values.
+/// The mechanism with the identified values of base parameters that are single parameters of effects as nominal values.
 fn with_identified_parameters(mechanism: &Mechanism) -> Mechanism {
     let mut mechanism = mechanism.clone();
     for (expression, value) in mechanism.identified_base.clone() {
@@ -113,8 +116,8 @@ pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<Descri
         .any(|(expression, _)| parameter_named(mechanism, expression).is_none())
     {
         remarks.push(message!(
-            "some values under `[identified]` are those of sums of parameters, which do not determine single bodies, so bodies have \
-             their nominal values. For a description of the real machine, identify with {} and write the fit with {}",
+            "some values under `[identified]` are those of parameters of bodies or sums of them, which do not determine complete \
+             bodies, so bodies have their nominal values. For a description of the real machine, identify with {} and write the fit with {}",
             Remedy::option(OptionName::Physical),
             Remedy::command(CommandName::Adopt)
         ));

@@ -253,7 +253,8 @@ impl<'a> MjcfReader<'a> {
                 return Err(located_message(node, &format!("`{what}` cannot be negative")));
             }
         }
-        let servo = self.joint_servo(node, gear, at_joints.get(name).is_some())?;
+        let is_second = at_joints.contains_key(name);
+        let servo = self.joint_servo(node, gear, is_second)?;
         at_joints
             .entry(name.to_owned())
             .and_modify(|sum| *sum = sum.zip(range).map(|([a, b], [c, d])| [a + c, b + d]))
@@ -268,6 +269,10 @@ impl<'a> MjcfReader<'a> {
             .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))?;
         // A free body cannot have a drive.
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
+        if is_second && joint.servo.is_some() {
+            let remark = "it acts on the same joint as a servo, whose controller is left out; in the model the drive has a force";
+            self.out.remarks.push(located_message(node, remark));
+        }
         joint.servo =
             servo.filter(|_| [DescriptionJointKind::Revolute, DescriptionJointKind::Prismatic].contains(&joint.kind));
         joint.armature += armature * (gear * gear);
@@ -299,6 +304,10 @@ impl<'a> MjcfReader<'a> {
             _ => None,
         };
         let Some([kp, Some(kd)]) = gains else {
+            if self.has_other_controller(node)? {
+                let remark = "its controller is left out; in the model the drive has a force";
+                self.out.remarks.push(located_message(node, remark));
+            }
             return Ok(None);
         };
         let mut reasons = Vec::new();
@@ -336,6 +345,15 @@ impl<'a> MjcfReader<'a> {
                 .filter(|[low, high]| is_opposite(*low, *high))
                 .map(|[_, high]| high),
         }))
+    }
+
+    /// Whether the force of an actuator depends on the state of its joint in a way that no actuator of a model has.
+    fn has_other_controller(&self, node: &Node<'a, '_>) -> Result<bool, String> {
+        Ok(match node.tag_name().name() {
+            "intvelocity" | "pid" | "orientation" | "damper" | "dcmotor" => true,
+            "general" => self.text(node, None, "biastype")?.is_some_and(|bias| bias == "affine"),
+            _ => false,
+        })
     }
 
     /// Stiffness and damping of a general actuator whose force is that of a position or velocity controller.
