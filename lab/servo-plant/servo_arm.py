@@ -2,6 +2,7 @@
 """Makes recordings/servo-arm: logs of a small servo arm without forces, simulated by MuJoCo.
 
     python3 lab/servo-plant/servo_arm.py
+    python3 lab/servo-plant/servo_arm.py --replay better.xml    # rms errors in degrees along check.csv, without writing logs
 
 The machine has the bodies and gains of recordings/servo-arm/servo_arm.xml. TRUE lists what differs: the description has no
 dry friction, another damping and rotor inertia, and no delay. The log has commands and positions, as encoders of 14 bits
@@ -10,6 +11,7 @@ read them, at 100 Hz. Its first column is the time in s. It needs numpy and mujo
 
 import pathlib
 import re
+import sys
 
 import mujoco
 import numpy as np
@@ -53,6 +55,32 @@ def log(seed: int) -> np.ndarray:
     return np.array(rows)
 
 
-for name, seed in [("fit", 1), ("check", 2)]:
-    header = "t,shoulder,elbow,shoulder_servo,elbow_servo"
-    np.savetxt(FOLDER / f"{name}.csv", log(seed), fmt=["%.2f"] + ["%.6f"] * 4, delimiter=",", header=header, comments="")
+def replay(path: str) -> np.ndarray:
+    """Rms errors of shoulder and elbow, rad, of a description under the interpolated commands of check.csv."""
+    recorded = np.loadtxt(FOLDER / "check.csv", delimiter=",", skiprows=1)
+    time, q, commands = recorded[:, 0], recorded[:, 1:3], recorded[:, 3:]
+    model = mujoco.MjModel.from_xml_path(path)
+    model.opt.timestep, model.opt.integrator = 5e-4, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # The commands are delayed here, so that the delay is no multiple of the step.
+    delays = model.actuator_delay.copy()
+    model.actuator_delay[:] = 0
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = q[0], (q[1] - q[0]) / (time[1] - time[0])
+    errors = []
+    for k, t in enumerate(time):
+        errors.append(data.qpos - q[k])
+        for i in range(20):
+            now = t + i * model.opt.timestep
+            data.ctrl[:] = [np.interp(now - delay, time, commands[:, j]) for j, delay in enumerate(delays)]
+            mujoco.mj_step(model, data)
+    return np.sqrt(np.mean(np.square(errors), axis=0))
+
+
+if "--replay" in sys.argv:
+    for path in sys.argv[sys.argv.index("--replay") + 1 :]:
+        print(path, np.degrees(replay(path)).round(4))
+else:
+    for name, seed in [("fit", 1), ("check", 2)]:
+        header = "t,shoulder,elbow,shoulder_servo,elbow_servo"
+        formats = ["%.2f"] + ["%.6f"] * 4
+        np.savetxt(FOLDER / f"{name}.csv", log(seed), fmt=formats, delimiter=",", header=header, comments="")

@@ -7,6 +7,8 @@
 //! Decision: an edit inserts text at one place, which is found from the spans of the parsed file. A parser that
 //! prints the complete document would change line ends and layout. The diagnosis and `add` use the same edit.
 
+mod adopted;
+
 use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
@@ -22,6 +24,8 @@ use crate::load::{LoadFailure, LoadedModel, load_with};
 use crate::mechanism::{EffectPlace, Mechanism, ModelEffect};
 use crate::suggest;
 use crate::values::is_name;
+
+pub use adopted::{AdoptedValues, write_identified};
 
 /// An effect to be written into a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -167,141 +171,6 @@ fn relocate_failure(mut failure: LoadFailure, old: &str, new: &str, effect: &New
     failure
 }
 
-/// Identified values to be written into a model file.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct AdoptedValues {
-    /// Where the values come from; printed as comment lines.
-    pub comment: String,
-    /// Values of parameters by their names.
-    pub parameters: Vec<(String, f64)>,
-    /// Values of base parameters by their expressions.
-    pub base: Vec<(String, f64)>,
-    /// Delays of the only actuators of drives, by the names of the drives, s.
-    pub delays: Vec<(String, f64)>,
-}
-
-/// Writes identified values into the text of a model file and replaces earlier ones, except for delays that the file has;
-/// everything else stays unchanged.
-///
-/// Fails if the text is not TOML, or if its table `identified` has another form than this function writes.
-///
-/// ```
-/// use modelmill_spec::edit::{AdoptedValues, write_identified};
-/// let values = AdoptedValues {
-///     comment: "from a fit".to_owned(),
-///     base: vec![("m*l".to_owned(), 2.5)],
-///     ..AdoptedValues::default()
-/// };
-/// let text = write_identified("name = \"arm\" # mine\n", &values).unwrap();
-/// assert_eq!(text, "name = \"arm\" # mine\n\n[identified]\n# from a fit\nbase = [\n  \
-///                   { expression = \"m*l\", value = 2.5 },\n]\n");
-/// assert_eq!(write_identified(&text, &values).unwrap(), text);
-/// ```
-pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, String> {
-    let text = &write_delays(text, &values.delays)?;
-    let mut log = DiagnosticLog::default();
-    let table = document::parse_toml(text, 0, &mut log);
-    if log.n_errors() > 0 {
-        return Err("this is not TOML; correct the file first".to_owned());
-    }
-    let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
-    let mut kept = text.to_owned();
-    // An earlier table is removed from its header to its last line of values.
-    if let Some((key, _)) = find_key(&table, "identified") {
-        let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
-        if text[start..].lines().next().map(str::trim) != Some("[identified]") {
-            return Err("write `[identified]` as a table of its own, on a line of its own".to_owned());
-        }
-        let mut end = text.len();
-        let mut at = start;
-        for line in text[start..].split_inclusive('\n') {
-            if at > start && line.trim_start().starts_with('[') {
-                end = at;
-                break;
-            }
-            at += line.len();
-        }
-        // Comments and blank lines above the next table belong to that table.
-        let own = &text[start..end];
-        let last = own.trim_end().rfind(['\n', ']', '}']).unwrap_or(own.len() - 1);
-        let own_end = own[last..].find('\n').map_or(own.len(), |line| last + line + 1);
-        kept = format!("{}{}", text[..start].trim_end(), line_end);
-        let rest = &text[start + own_end..];
-        // The new table takes the place of the old one if other tables follow.
-        if !rest.trim().is_empty() {
-            let block = identified_table(values, line_end);
-            return Ok(format!(
-                "{kept}{line_end}{block}{line_end}{}",
-                rest.trim_start_matches(['\r', '\n'])
-            ));
-        }
-    }
-    // Otherwise it is appended, separated by an empty line.
-    if !kept.is_empty() {
-        if !kept.ends_with('\n') {
-            kept.push_str(line_end);
-        }
-        kept.push_str(line_end);
-    }
-    Ok(kept + &identified_table(values, line_end))
-}
-
-/// Writes delays into the actuators of some drives that have none. A delay of the file is kept.
-///
-/// Fails if the text is not TOML.
-fn write_delays(text: &str, delays: &[(String, f64)]) -> Result<String, String> {
-    let mut log = DiagnosticLog::default();
-    let table = document::parse_toml(text, 0, &mut log);
-    if log.n_errors() > 0 {
-        return Err("this is not TOML; correct the file first".to_owned());
-    }
-    let mut edited = text.to_owned();
-    let Some((
-        _,
-        TomlNode {
-            value: TomlValue::Array(actuators),
-            ..
-        },
-    )) = find_key(&table, "actuator")
-    else {
-        return Ok(edited);
-    };
-    // From the last to the first, so that places before an edit stay valid.
-    for actuator in actuators.iter().rev() {
-        let TomlValue::Table(entries) = &actuator.value else {
-            continue;
-        };
-        let Some((
-            _,
-            TomlNode {
-                value: TomlValue::Text { text: drive, .. },
-                span,
-            },
-        )) = find_key(entries, "drive")
-        else {
-            continue;
-        };
-        let delay = delays.iter().find(|(name, _)| name == drive);
-        let Some((_, delay)) = delay.filter(|_| find_key(entries, "delay").is_none()) else {
-            continue;
-        };
-        let line = text[span.end..].split('\n').next().unwrap_or_default();
-        let rest = line.trim();
-        if rest.is_empty() || rest.starts_with('#') {
-            let line_end = if line.ends_with('\r') { "\r\n" } else { "\n" };
-            let at = span.end + line.trim_end_matches('\r').len();
-            edited.insert_str(at, &format!("{line_end}delay = {delay:?}"));
-        } else {
-            // A table on one line.
-            edited.insert_str(span.end, &format!(", delay = {delay:?}"));
-        }
-    }
-    // An inline table over several lines is left as it is.
-    let mut log = DiagnosticLog::default();
-    document::parse_toml(&edited, 0, &mut log);
-    Ok(if log.n_errors() > 0 { text.to_owned() } else { edited })
-}
-
 /// Writes the vector of gravity, m/s^2, into the text of a model file. It replaces the entry `gravity`; without such an
 /// entry, it is inserted before all other entries.
 ///
@@ -325,28 +194,6 @@ pub fn write_gravity(text: &str, gravity: [f64; 3]) -> Result<String, String> {
         Some((key, value)) => format!("{}{entry}{}", &text[..key.span.start], &text[value.span.end..]),
         None => format!("{entry}\n{text}"),
     })
-}
-
-/// The text of the table of identified values.
-fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
-    let mut lines = vec!["[identified]".to_owned()];
-    // Control characters would end a comment.
-    let comment = values.comment.lines();
-    lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
-    if !values.parameters.is_empty() {
-        let pairs = values.parameters.iter();
-        let pairs: Vec<String> = pairs.map(|(name, value)| format!("{name} = {value:?}")).collect();
-        lines.push(format!("parameters = {{ {} }}", pairs.join(", ")));
-    }
-    if !values.base.is_empty() {
-        lines.push("base = [".to_owned());
-        for (expression, value) in &values.base {
-            let expression = expression.replace('\\', "\\\\").replace('"', "\\\"");
-            lines.push(format!("  {{ expression = \"{expression}\", value = {value:?} }},"));
-        }
-        lines.push("]".to_owned());
-    }
-    lines.join(line_end) + line_end
 }
 
 /// Adds an effect to the text of a model file. Whether the effect fits the model is not checked.

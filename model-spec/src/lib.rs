@@ -33,6 +33,7 @@ mod mechanics;
 mod mechanism;
 mod merge;
 mod motion;
+mod nominal;
 mod numeric;
 mod parser;
 mod pose;

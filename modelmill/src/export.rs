@@ -60,9 +60,7 @@ impl Model {
     /// Whether each value of a fit is that of a parameter of an effect or of a number of the file.
     fn determines_parameters(&self, fit: &FitFile) -> bool {
         let mechanism = &self.derivation.mechanism;
-        let terms = || mechanism.effects.iter().flat_map(|effect| &effect.terms);
-        let is_single =
-            |one: &FitParameter| terms().any(|term| mechanism.parameters[term.parameter.0].name == one.expression);
+        let is_single = |one: &FitParameter| mechanism.effect_parameter(&one.expression).is_some();
         let mut all = fit.parameters.iter();
         all.all(|one| one.status == ParameterStatus::Known || is_single(one))
     }

@@ -16,7 +16,7 @@ use modelmill::runs::UnreadRun;
 use modelmill::states::{ModelFunction, ModelFunctions, StateSamples};
 use modelmill::text::style::TerminalStyle;
 use modelmill::variants::VariantComparison;
-use modelmill::{Error, FitFile, Host, Model, Outcome, export, import};
+use modelmill::{Error, FitFile, Host, Model, Outcome, RecordingNote, export, import};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -591,7 +591,17 @@ impl CoreModel {
             let fit = self.model.host().fit(&path)?;
             self.model.values_of(&fit, &path.display().to_string())
         })?;
-        Ok((found.values, remarks(&found.notes)))
+        let mut notes = remarks(&found.notes);
+        if !found.gains.is_empty() {
+            let names: Vec<&str> = found.gains.iter().map(|(name, _)| name.as_str()).collect();
+            let says = format!(
+                "{} has values of {}, which are not used here; write them into the model file with `adopt`",
+                path.display(),
+                names.join(", ")
+            );
+            notes.extend(remarks(&[RecordingNote::warning(says)]));
+        }
+        Ok((found.values, notes))
     }
 
     /// Physical parameters from a fit, which is a text with a name or the path of a file.

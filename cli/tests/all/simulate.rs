@@ -213,6 +213,8 @@ fn commands_move_the_model_whatever_forces_the_log_has() {
     // Under these forces it leaves the motion of the log.
     let told = json(&["simulate", &arm, "--data", &log, "--out", &motion, "--json"]);
     assert_eq!(told["input"], "forces");
+    let largest = table(&motion).iter().map(|row| row[1].abs()).fold(0.0, f64::max);
+    assert!(largest > 3.0, "{largest}");
 }
 
 #[test]

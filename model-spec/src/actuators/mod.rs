@@ -342,6 +342,14 @@ impl ModelActuator {
         std::array::from_fn(|place| force(unit(place)))
     }
 
+    /// Its force, N or N m, with [`Self::slopes`], dead band and saturation, at a signal, the signal's rate, a position and
+    /// its rate.
+    pub fn force(&self, slopes: &[f64; 4], [signal, signal_rate, position, rate]: [f64; 4]) -> f64 {
+        let states = [self.effective_signal(signal, position), signal_rate, position, rate];
+        let sum = slopes.iter().zip(states).map(|(slope, state)| slope * state).sum();
+        self.limited_force(sum)
+    }
+
     /// Whether its force depends on the error of a position.
     pub fn has_position_error(&self) -> bool {
         self.quantity == SignalQuantity::Position

@@ -39,14 +39,7 @@ impl SimulatedActuator {
     /// The force, N or N m, at a time and a state of the drive. `time` are the times of the signal, s.
     pub(crate) fn force(&self, time: &[f64], t: f64, [position, rate]: [f64; 2]) -> f64 {
         let [signal, signal_rate] = [&self.signal, &self.signal_rate].map(|column| interpolate_at(time, column, t));
-        let states = [
-            self.actuator.effective_signal(signal, position),
-            signal_rate,
-            position,
-            rate,
-        ];
-        let sum: f64 = self.slopes.iter().zip(states).map(|(slope, state)| slope * state).sum();
-        self.actuator.limited_force(sum)
+        self.actuator.force(&self.slopes, [signal, signal_rate, position, rate])
     }
 
     /// Stiffness and damping at the drive, N/m and N s/m, or N m/rad and N m s/rad.

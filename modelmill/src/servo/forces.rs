@@ -404,9 +404,7 @@ impl<'a> ActuatorForces<'a> {
                 });
                 let delayed = |column: &[f64], times: &[f64]| interpolate(times, column, &time, delay.value);
                 let signals = [delayed(&signal, &time), delayed(&motion.signal_rates[k], &motion.time)];
-                let constants = &mechanism.constants;
-                let slopes = actuator.slopes(&|c| constants[c].value, &|term| self.gains.term_value(term));
-                let simulated = SimulatedActuator::new(actuator, slopes, signals);
+                let simulated = SimulatedActuator::new(actuator, self.gains.slopes(self.model, actuator), signals);
                 computed.actuators.push(simulated);
                 phrases.push(self.phrase(actuator, delay));
             }
@@ -634,23 +632,11 @@ pub(super) struct ActuatorStates {
 impl ActuatorStates {
     /// The force of the actuator, N or N m.
     pub(super) fn forces(&self, model: &Model, actuator: &ModelActuator, gains: &GainValues) -> Vec<f64> {
-        let constants = &model.derivation.mechanism.constants;
-        let values: Vec<f64> = actuator.terms.iter().map(|term| gains.term_value(term)).collect();
+        let slopes = gains.slopes(model, actuator);
         (0..self.signal.len())
             .map(|sample| {
-                let position = self.position[sample];
-                let signal = actuator.effective_signal(self.signal[sample], position);
-                let symbol = |symbol: ModelSymbol| match symbol {
-                    ModelSymbol::Constant(c) => constants[c.0].value,
-                    ModelSymbol::Place(PlaceQuantity::Coordinate) => position,
-                    ModelSymbol::Place(PlaceQuantity::Rate) => self.rate[sample],
-                    ModelSymbol::Place(PlaceQuantity::OtherCoordinate) => signal,
-                    ModelSymbol::Place(PlaceQuantity::OtherRate) => self.signal_rate[sample],
-                    _ => 0.0,
-                };
-                let terms = actuator.terms.iter().zip(&values);
-                let force: f64 = terms.map(|(term, value)| value * term.factor.evaluate(&symbol)).sum();
-                actuator.limited_force(force)
+                let states = [&self.signal, &self.signal_rate, &self.position, &self.rate];
+                actuator.force(&slopes, states.map(|column| column[sample]))
             })
             .collect()
     }

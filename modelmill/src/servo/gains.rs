@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_spec::{ActuatorTerm, Mechanism};
+use modelmill_spec::{ActuatorTerm, Mechanism, ModelActuator};
 
 use super::ServoModel;
 use super::delay::ServoDelay;
@@ -102,8 +102,14 @@ impl GainValues {
         Ok(())
     }
 
+    /// The slopes of the force of an actuator, see [`ModelActuator::slopes`].
+    pub(super) fn slopes(&self, model: &Model, actuator: &ModelActuator) -> [f64; 4] {
+        let constants = &model.derivation.mechanism.constants;
+        actuator.slopes(&|c| constants[c].value, &|term| self.term_value(term))
+    }
+
     /// The value of the parameters of a term; 1 if the term is known.
-    pub(super) fn term_value(&self, term: &ActuatorTerm) -> f64 {
+    fn term_value(&self, term: &ActuatorTerm) -> f64 {
         self.values.get(&product_of(term)).copied().unwrap_or(1.0)
     }
 
@@ -170,12 +176,7 @@ fn fixing_clause(servo: &ServoModel, base: usize) -> String {
 
 /// The nominal value of a product; `None` if a parameter has none.
 pub(super) fn nominal_value(mechanism: &Mechanism, product: &GainProduct) -> Option<f64> {
-    let factor = |(p, power): &(usize, u32)| {
-        let parameter = &mechanism.parameters[*p];
-        let power = i32::try_from(*power).unwrap_or(i32::MAX);
-        parameter.has_nominal.then(|| parameter.nominal.powi(power))
-    };
-    product.iter().map(factor).product()
+    mechanism.nominal_product(product.iter().copied())
 }
 
 /// The parameters of a term.

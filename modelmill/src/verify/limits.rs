@@ -91,13 +91,30 @@ impl VerificationLimits {
             place.error(at, &format!("this is not valid TOML: {}", error.message()))
         })?;
         let mut limits = Self::default();
+        let mut positions_at = 0;
         for (key, value) in table.get_ref() {
             let (name, at) = (key.get_ref().as_ref(), value.span().start);
             match name {
                 "all_drives" => limits.all_drives = drive_limit(&place, value.get_ref(), at)?,
-                "drives" => limits.read_drives(model, &place, value.get_ref(), at)?,
+                "drives" => {
+                    let table = NamedLimits {
+                        key: "drives",
+                        one: "drive",
+                        names: model.row_names(),
+                    };
+                    limits.drives = place.named_limits(model, &table, value.get_ref(), at, drive_limit)?;
+                }
                 "all_positions" => limits.all_positions = position_limit(&place, value.get_ref(), at)?,
-                "positions" => limits.read_positions(model, &place, value.get_ref(), at)?,
+                "positions" => {
+                    let names = model.active_coordinates();
+                    let table = NamedLimits {
+                        key: "positions",
+                        one: "independent coordinate",
+                        names,
+                    };
+                    limits.positions = place.named_limits(model, &table, value.get_ref(), at, position_limit)?;
+                    positions_at = at;
+                }
                 "parameters" => limits.read_parameters(model, &place, value.get_ref(), at)?,
                 "effects" => limits.read_effects(&place, value.get_ref(), at)?,
                 other => {
@@ -108,6 +125,17 @@ impl VerificationLimits {
                     return Err(place.error(key.span().start, &says));
                 }
             }
+        }
+        // A horizon without an error would check nothing.
+        let without = limits
+            .positions
+            .iter()
+            .find(|(name, _)| limits.position(name).rms.is_none());
+        if let Some((name, _)) = without {
+            return Err(place.error(positions_at, &format!("[positions.{name}] has no `error`, rad or m")));
+        }
+        if limits.all_positions.rms.is_none() && limits.all_positions.horizon.is_some() && limits.positions.is_empty() {
+            return Err(place.error(0, "[all_positions] has no `error`, rad or m"));
         }
         Ok(limits)
     }
@@ -135,44 +163,6 @@ impl VerificationLimits {
         found
             .find(|(key, _)| key == name || key == expression)
             .map(|(_, interval)| *interval)
-    }
-
-    /// Reads the table `drives`.
-    fn read_drives(&mut self, model: &Model, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
-        let drives = model.row_names();
-        for (key, value) in place.table(value, at, "drives")? {
-            let name = key.get_ref().as_ref();
-            if !drives.iter().any(|drive| drive == name) {
-                let says = format!(
-                    "{} has no drive `{name}`; its drives are {}",
-                    model.path,
-                    drives.join(", ")
-                );
-                return Err(place.error(key.span().start, &says));
-            }
-            let limit = drive_limit(place, value.get_ref(), value.span().start)?;
-            self.drives.push((name.to_owned(), limit));
-        }
-        Ok(())
-    }
-
-    /// Reads the table `positions`.
-    fn read_positions(&mut self, model: &Model, place: &LimitsText<'_>, value: &DeValue<'_>, at: usize) -> Outcome {
-        let coordinates = model.active_coordinates();
-        for (key, value) in place.table(value, at, "positions")? {
-            let name = key.get_ref().as_ref();
-            if !coordinates.iter().any(|coordinate| coordinate == name) {
-                let says = format!(
-                    "{} has no independent coordinate `{name}`; its independent coordinates are {}",
-                    model.path,
-                    coordinates.join(", ")
-                );
-                return Err(place.error(key.span().start, &says));
-            }
-            let limit = position_limit(place, value.get_ref(), value.span().start)?;
-            self.positions.push((name.to_owned(), limit));
-        }
-        Ok(())
     }
 
     /// Reads the table `parameters`.
@@ -310,7 +300,49 @@ struct LimitsText<'a> {
     file: &'a str,
 }
 
+/// A table of limits by the names of a model.
+struct NamedLimits {
+    /// Its key.
+    key: &'static str,
+    /// What has a name, in messages.
+    one: &'static str,
+    /// The names of the model.
+    names: Vec<String>,
+}
+
 impl LimitsText<'_> {
+    /// The limits of a table by name, each read by `read`.
+    ///
+    /// Fails at names that the model does not have.
+    fn named_limits<T>(
+        &self,
+        model: &Model,
+        table: &NamedLimits,
+        value: &DeValue<'_>,
+        at: usize,
+        read: impl Fn(&Self, &DeValue<'_>, usize) -> Outcome<T>,
+    ) -> Outcome<Vec<(String, T)>> {
+        let NamedLimits {
+            key: table_key,
+            one,
+            names,
+        } = table;
+        let mut limits = Vec::new();
+        for (key, value) in self.table(value, at, table_key)? {
+            let name = key.get_ref().as_ref();
+            if !names.iter().any(|other| other == name) {
+                let says = format!(
+                    "{} has no {one} `{name}`; its {one}s are {}",
+                    model.path,
+                    names.join(", ")
+                );
+                return Err(self.error(key.span().start, &says));
+            }
+            limits.push((name.to_owned(), read(self, value.get_ref(), value.span().start)?));
+        }
+        Ok(limits)
+    }
+
     /// An error at a byte of the text.
     fn error(&self, at: usize, says: &str) -> Error {
         let before = self.text.get(..at).unwrap_or_default();

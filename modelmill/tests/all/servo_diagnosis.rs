@@ -10,7 +10,7 @@ use modelmill::{Error, Model};
 use crate::servo::{Columns, Planted, PlantedLimits, pendulum, simulate_limited};
 
 const KNOWN: [(&str, f64); 2] = [("kp", 20.0), ("kd", 0.4)];
-const PLANTED: Planted = Planted {
+pub(crate) const PLANTED: Planted = Planted {
     j: 0.05,
     ml: 0.15,
     kp: 20.0,
@@ -19,17 +19,17 @@ const PLANTED: Planted = Planted {
     coulomb: 0.1,
     delay: 0.008,
 };
-const NONE: PlantedLimits = PlantedLimits {
+pub(crate) const NONE: PlantedLimits = PlantedLimits {
     saturation: f64::INFINITY,
     dead_band: 0.0,
 };
 
-fn model(text: &str) -> Model {
+pub(crate) fn model(text: &str) -> Model {
     Model::from_text("servo.toml", text).unwrap()
 }
 
 /// A log as a recording with the forces of the actuator.
-fn prepare(model: &Model, log: Columns) -> Result<PreparedRecording, Error> {
+pub(crate) fn prepare(model: &Model, log: Columns) -> Result<PreparedRecording, Error> {
     let options = RecordingOptions::default();
     let read = model.read_recording_of_table("log", log, &options);
     let [mut fit, _] = model.prepare_together(model.add_actuator_forces([vec![read], Vec::new()]));
@@ -73,12 +73,14 @@ fn by_encoder(mut log: Columns) -> Columns {
 }
 
 /// The values of the base parameters of the pendulum, by their expressions.
-fn values(model: &Model, planted: &Planted) -> Vec<f64> {
+pub(crate) fn values(model: &Model, planted: &Planted) -> Vec<f64> {
     let value = |expression: &str| match expression {
         "J" => planted.j,
         "ml" => planted.ml,
         "Fv_motor" => planted.viscous,
         "Fc_motor" => planted.coulomb,
+        // Numbers of the file.
+        "1" => 1.0,
         other => panic!("{other}"),
     };
     model.base.iter().map(|base| value(&base.expression)).collect()

@@ -9,42 +9,10 @@ use modelmill::verify::{CheckScope, CheckState, VerificationLimits};
 use modelmill::{Host, Model};
 
 use crate::servo::{Columns, Planted, PlantedLimits, pendulum, simulate_limited};
-
-const PLANTED: Planted = Planted {
-    j: 0.05,
-    ml: 0.15,
-    kp: 20.0,
-    kd: 0.4,
-    viscous: 0.05,
-    coulomb: 0.1,
-    delay: 0.008,
-};
-const UNLIMITED: PlantedLimits = PlantedLimits {
-    saturation: f64::INFINITY,
-    dead_band: 0.0,
-};
-
-fn model(text: &str) -> Model {
-    Model::from_text("servo.toml", text).unwrap()
-}
+use crate::servo_diagnosis::{self, NONE as UNLIMITED, PLANTED, model, values};
 
 fn prepare(model: &Model, log: Columns) -> PreparedRecording {
-    let read = model.read_recording_of_table("log", log, &RecordingOptions::default());
-    let [mut fit, _] = model.prepare_together(model.add_actuator_forces([vec![read], Vec::new()]));
-    fit.remove(0).unwrap()
-}
-
-/// The planted values of the base parameters of the pendulum.
-fn values(model: &Model, planted: &Planted) -> Vec<f64> {
-    let value = |expression: &str| match expression {
-        "J" => planted.j,
-        "ml" => planted.ml,
-        "Fv_motor" => planted.viscous,
-        "Fc_motor" => planted.coulomb,
-        "1" => 1.0,
-        other => panic!("{other}"),
-    };
-    model.base.iter().map(|base| value(&base.expression)).collect()
+    servo_diagnosis::prepare(model, log).unwrap()
 }
 
 /// Rms difference of the position of a simulation under the commands of a log and the position of the log, rad.
@@ -234,5 +202,7 @@ fn wrong_limits_of_positions_name_their_line() {
     };
     assert!(says("[positions.p]\nerror = 1.0\n").contains("line 1: servo.toml has no independent coordinate `p`"));
     assert!(says("[positions.q]\nlimit = 1.0\n").contains("line 2: there is no limit `limit` of a position"));
+    assert!(says("[positions.q]\nhorizon = 1.0\n").contains("[positions.q] has no `error`"));
+    assert!(says("[all_positions]\nhorizon = 1.0\n").contains("[all_positions] has no `error`"));
     assert!(says("[all_positions]\nhorizon = -1\n").contains("line 2: `horizon` is a number above 0"));
 }

@@ -353,22 +353,14 @@ impl MjcfWriter<'_> {
             }
         };
         let actuator = own[0];
-        let parameters = |one: &ActuatorTerm| one.parameters.iter().all(|(p, _)| m.parameters[p.0].has_nominal);
-        if !actuator.terms.iter().all(parameters) {
+        let gain = |term: &ActuatorTerm| m.nominal_product(term.parameters.iter().map(|(p, power)| (p.0, *power)));
+        if actuator.terms.iter().any(|term| gain(term).is_none()) {
             self.remarks.push(message!(
                 "a gain of `{name}` has no nominal value: its servo becomes a motor whose control is the force"
             ));
             return None;
         }
-        let gain = |term: &ActuatorTerm| -> f64 {
-            let powers = term.parameters.iter();
-            let factors = powers.map(|(p, power)| {
-                m.parameters[p.0]
-                    .nominal
-                    .powi(i32::try_from(*power).unwrap_or(i32::MAX))
-            });
-            factors.product()
-        };
+        let gain = |term: &ActuatorTerm| gain(term).unwrap_or(0.0);
         let [stiffness, command_rate, _, rate] = actuator.slopes(&|c| m.constants[c].value, &gain);
         let mut text = String::new();
         if element == "position" {

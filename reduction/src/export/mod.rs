@@ -69,20 +69,13 @@ impl fmt::Display for ExportError {
 
 impl std::error::Error for ExportError {}
 
-/// The place of a parameter of an effect that is a base parameter by itself, by the expression of the base parameter.
-/// Parameters of bodies are left out: a body needs all ten of them from one source.
-fn parameter_named(mechanism: &Mechanism, expression: &str) -> Option<usize> {
-    let terms = mechanism.effects.iter().flat_map(|effect| &effect.terms);
-    let mut places = terms.map(|term| term.parameter.0);
-    places.find(|p| mechanism.parameters[*p].name == expression)
-}
-
 /// The mechanism with the identified values of base parameters that are single parameters of effects as nominal values.
+/// Parameters of bodies are left out: a body needs all ten of them from one source.
 fn with_identified_parameters(mechanism: &Mechanism) -> Mechanism {
     let mut mechanism = mechanism.clone();
     for (expression, value) in mechanism.identified_base.clone() {
-        if let Some(p) = parameter_named(&mechanism, &expression) {
-            let parameter = &mut mechanism.parameters[p];
+        if let Some(p) = mechanism.effect_parameter(&expression) {
+            let parameter = &mut mechanism.parameters[p.0];
             (parameter.nominal, parameter.has_nominal) = (value, true);
         }
     }
@@ -113,7 +106,7 @@ pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<Descri
     if mechanism
         .identified_base
         .iter()
-        .any(|(expression, _)| parameter_named(mechanism, expression).is_none())
+        .any(|(expression, _)| mechanism.effect_parameter(expression).is_none())
     {
         remarks.push(message!(
             "some values under `[identified]` are those of parameters of bodies or sums of them, which do not determine complete \
