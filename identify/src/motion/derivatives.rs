@@ -6,6 +6,7 @@
 //! are [`crate::StatePreparation::emps`]. The cut-off is chosen by [`crate::motion::cutoff`]. Periodic motions are
 //! better treated by [`crate::motion::series`].
 
+use crate::motion::even::{SampleSpacing, sample_spacing};
 use crate::signal::{FilterError, LowPass};
 
 /// The derivative of `values` at each time, from the parabola through three neighbours. This is the central
@@ -34,6 +35,32 @@ pub fn differentiate(time: &[f64], values: &[f64]) -> Vec<f64> {
     derivative.extend((1..n - 1).map(|i| slope(i, i)));
     derivative.push(slope(n - 2, n - 1));
     derivative
+}
+
+/// Rates and accelerations of smooth positions at even times, from polynomials of degree six through seven neighbours, of
+/// order `h^6` in the step `h`; `None` for uneven times or fewer than seven samples. Three samples at both ends have central
+/// differences or one-sided ones, see [`differentiate`].
+///
+/// Central differences make rates too small by `(w h)^2/6` at an angular frequency `w`. Where terms nearly cancel, as in
+/// the equations of a servo that follows its command, this is no small error. Panics unless `positions` is as long as `time`.
+/// Source: B. Fornberg, "Generation of finite difference formulas on arbitrarily spaced grids", Math. Comp. 51 (1988).
+pub fn differentiate_accurately(time: &[f64], positions: &[f64]) -> Option<[Vec<f64>; 2]> {
+    let n = time.len();
+    if n < 7 || sample_spacing(time) == SampleSpacing::Uneven {
+        return None;
+    }
+    let mut rates = differentiate(time, positions);
+    let mut accelerations = differentiate(time, &rates);
+    let step = (time[n - 1] - time[0]) / (n - 1) as f64;
+    for i in 3..n - 3 {
+        let [before, after] = [-1, 1].map(|sign| [1, 2, 3].map(|k| positions[i.wrapping_add_signed(sign * k)]));
+        let difference = |k: usize| after[k] - before[k];
+        let sum = |k: usize| after[k] + before[k];
+        rates[i] = (45.0 * difference(0) - 9.0 * difference(1) + difference(2)) / (60.0 * step);
+        let curvature = 270.0 * sum(0) - 27.0 * sum(1) + 2.0 * sum(2) - 490.0 * positions[i];
+        accelerations[i] = curvature / (180.0 * step * step);
+    }
+    Some([rates, accelerations])
 }
 
 /// One coordinate with its derivatives; all columns have the same length.
@@ -73,6 +100,23 @@ pub(crate) fn mean_rate(time: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn derivatives_of_a_sine_are_accurate_to_the_sixth_power_of_the_step() {
+        let time: Vec<f64> = (0..200).map(|k| f64::from(k) * 0.005).collect();
+        let (w, phase) = (13.0, 0.3);
+        let positions: Vec<f64> = time.iter().map(|t| (w * t + phase).sin()).collect();
+        let [rates, accelerations] = differentiate_accurately(&time, &positions).unwrap();
+        let central = differentiate(&time, &positions);
+        for i in 3..time.len() - 3 {
+            let (sine, cosine) = (w * time[i] + phase).sin_cos();
+            assert!((rates[i] - w * cosine).abs() < 1e-8 * w);
+            assert!((accelerations[i] + w * w * sine).abs() < 1e-8 * w * w);
+            let share = (central[i] - w * cosine).abs() / (w * cosine).abs();
+            assert!((share / ((w * 0.005_f64).powi(2) / 6.0) - 1.0).abs() < 0.01);
+        }
+        assert!(differentiate_accurately(&[0.0, 0.1, 0.35, 0.4, 0.7, 1.3, 1.4], &positions[..7]).is_none());
+    }
 
     #[test]
     fn parabolas_are_differentiated_exactly_on_uneven_times() {

@@ -116,6 +116,7 @@ impl SignalRecording {
         };
         // Record what was chosen.
         prepared.cutoff_hz = Some(cutoff);
+        prepared.butterworth_order = matches!(way, SmoothingFilter::Butterworth { .. }).then_some(order);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
         // A series has no transients at the ends.
         if !matches!(way, SmoothingFilter::Series { .. }) {

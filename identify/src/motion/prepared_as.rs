@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 pub struct PreparationRecord {
     /// Cut-off of the low-pass, Hz, if anything was filtered.
     pub cutoff_hz: Option<f64>,
+    /// Order in one direction of Butterworth's filter, if that was the low-pass.
+    #[serde(skip)]
+    pub butterworth_order: Option<usize>,
     /// Whether the cut-off was chosen from the signal instead of given.
     pub cutoff_chosen: bool,
     /// Highest frequency at which forces are compared in addition to the raw figures, Hz.

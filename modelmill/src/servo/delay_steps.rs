@@ -5,11 +5,13 @@
 //! commands, so that it is its own instrument. Least squares would be biased: noise of the accelerations makes inertias
 //! too small, and a delay makes up for it.
 
+use std::collections::BTreeMap;
+
 use super::delay::ServoDelay;
 use super::estimate::{ServoEstimator, ServoSystem};
 use super::rows::EquationRows;
 use super::thresholds::{
-    DELAY_ITERATIONS, DELAY_STEP, DELAY_TOLERANCE, HALF_INTERVAL, LARGEST_DELAY, LARGEST_DELAY_STEP,
+    DELAY_ITERATIONS, DELAY_RESTARTS, DELAY_STEP, DELAY_TOLERANCE, HALF_INTERVAL, LARGEST_DELAY, LARGEST_DELAY_STEP,
 };
 use crate::error::Outcome;
 
@@ -25,12 +27,63 @@ pub(super) struct DelayColumns {
 /// Improves the delays that the file does not give. Those stay that the equations do not determine, and all of them if
 /// the steps do not converge.
 ///
+/// A servo that follows its command nearly without error has two solutions: a longer delay with a smaller damping and a
+/// negative inertia satisfies the equations nearly as well. If an estimate has an impossible sign, the steps begin again
+/// at shorter delays of its drive, and the solution whose signs are least impossible is taken.
+///
 /// Fails when a pose has no solution.
 pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
     let estimated: Vec<usize> = (0..delays.len()).filter(|k| delays[*k].interval.is_some()).collect();
     if estimated.is_empty() {
         return Ok(());
     }
+    let actuators = system.servo.actuators();
+    let first_estimates = delays.to_vec();
+    step_to_solution(system, delays, &estimated)?;
+    let mut negative = negative_rows(system, delays)?;
+    for share in DELAY_RESTARTS {
+        if negative.is_empty() {
+            break;
+        }
+        let mut other = delays.to_vec();
+        for k in estimated
+            .iter()
+            .filter(|k| negative.contains_key(&actuators[**k].drive.0))
+        {
+            other[*k].value = share * first_estimates[*k].value;
+        }
+        step_to_solution(system, &mut other, &estimated)?;
+        let others = negative_rows(system, &other)?;
+        if others.values().sum::<f64>() < negative.values().sum::<f64>() {
+            negative = others;
+            delays.clone_from_slice(&other);
+        }
+    }
+    Ok(())
+}
+
+/// The drives in whose equations estimates are negative that must be positive, with the sum of the squares of these
+/// estimates in standard deviations.
+fn negative_rows(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTreeMap<usize, f64>> {
+    let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
+    let solved = system.solve(&values)?;
+    let body_rows = system.servo.body_rows();
+    let width = system.servo.equations.base.len();
+    let mut negative = BTreeMap::new();
+    for (k, sigmas) in system.negative_estimates(&solved) {
+        let mut squares = vec![0.0; body_rows.len()];
+        for (i, row) in solved.equations.regressor.chunks_exact(width).enumerate() {
+            squares[i % body_rows.len()] += row[k] * row[k];
+        }
+        // A parameter belongs to the drive in whose equation it has the largest effect.
+        let largest = (0..squares.len()).max_by(|a, b| squares[*a].total_cmp(&squares[*b]));
+        *negative.entry(largest.map_or(0, |row| body_rows[row])).or_insert(0.0) += sigmas * sigmas;
+    }
+    Ok(negative)
+}
+
+/// Gauss-Newton steps of some delays, given by place, from their present values.
+fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimated: &[usize]) -> Outcome {
     let first_estimates = delays.to_vec();
     let mut last_step = f64::INFINITY;
     for _ in 0..DELAY_ITERATIONS {
@@ -40,7 +93,7 @@ pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [Serv
             last_step = f64::INFINITY;
             break;
         }
-        let columns = delay_columns(system, &values, &estimated, &system.base_values(&solved))?;
+        let columns = delay_columns(system, &values, estimated, &system.base_values(&solved))?;
         let joint = system.solve_weighted(
             &solved.equations,
             solved.instruments.as_ref(),

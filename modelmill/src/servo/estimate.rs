@@ -160,7 +160,7 @@ impl ServoModel {
             system.row_errors(&system.equations(&values)?.0, &base)
         };
         let fitted = system.row_errors(&solved.equations, &base);
-        let mut notes = remarks(self, &system.unknown, &solved, &delays);
+        let mut notes = remarks(&system, &solved, &delays);
         notes.extend(system.turn_notes());
         notes.extend(large_errors(&fitted, "the fitted recordings"));
         notes.extend(large_errors(&checked, "the validation run"));
@@ -459,6 +459,16 @@ impl<'a> ServoSystem<'a> {
         values
     }
 
+    /// Estimates that must be positive and are not: the base parameter, and by how many standard deviations it is negative.
+    pub(super) fn negative_estimates(&self, solved: &ServoSolution) -> Vec<(usize, f64)> {
+        let estimates = solved.solution.values.iter().zip(&solved.uncertainty.std);
+        let sigmas = estimates.zip(&self.unknown).map(|((value, std), k)| (*k, -value / std));
+        let must_be_positive = |k: usize| self.servo.equations.sign_of_base_parameter(k) == Sign::Positive;
+        sigmas
+            .filter(|(k, sigmas)| *sigmas > 0.0 && must_be_positive(*k))
+            .collect()
+    }
+
     /// Covariance of all base parameters, zero for fixed ones: that of the solution, and for each delay the change of the
     /// solution over one standard deviation of the delay.
     fn covariance(&self, delays: &[ServoDelay], solved: &ServoSolution) -> Outcome<DMatrix<f64>> {
@@ -611,7 +621,9 @@ fn large_errors(rows: &[ServoRowError], place: &str) -> Vec<RecordingNote> {
 }
 
 /// Notes on the result.
-fn remarks(servo: &ServoModel, unknown: &[usize], solved: &ServoSolution, delays: &[ServoDelay]) -> Vec<RecordingNote> {
+fn remarks(system: &ServoSystem<'_>, solved: &ServoSolution, delays: &[ServoDelay]) -> Vec<RecordingNote> {
+    let (servo, unknown) = (system.servo, &system.unknown);
+    let negative = system.negative_estimates(solved);
     let mut notes = Vec::new();
     for freedom in &servo.scale.freedoms {
         let base = &servo.equations.base;
@@ -635,15 +647,12 @@ fn remarks(servo: &ServoModel, unknown: &[usize], solved: &ServoSolution, delays
              of a position controller, or filter more strongly."
         )));
     }
-    for (at, k) in unknown.iter().enumerate() {
-        let (value, std) = (solved.solution.values[at], solved.uncertainty.std[at]);
-        if servo.equations.sign_of_base_parameter(*k) == Sign::Positive && value < -IMPOSSIBLE_SIGMAS * std {
-            notes.push(RecordingNote::warning(message!(
-                "{} is negative, which is not possible: the model of the servo or of the machine is wrong; check the kind of \
-                 actuator, its signal, and whether the controller adds a feed-forward force.",
-                servo.equations.base[*k].expression
-            )));
-        }
+    for (k, _) in negative.iter().filter(|(_, sigmas)| *sigmas > IMPOSSIBLE_SIGMAS) {
+        notes.push(RecordingNote::warning(message!(
+            "{} is negative, which is not possible: the model of the servo or of the machine is wrong; check the kind of \
+             actuator, its signal, and whether the controller adds a feed-forward force.",
+            servo.equations.base[*k].expression
+        )));
     }
     let names: Vec<String> = unknown
         .iter()

@@ -10,6 +10,7 @@
 
 mod delay;
 mod delay_steps;
+mod direction;
 mod estimate;
 mod forces;
 mod gains;

@@ -1,12 +1,14 @@
 //! Equations of a servo log: rows of the regressor along a segment with delayed signals, and the samples that count.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_spec::{ExactExpression, ExactFunction, ModelActuator};
+use modelmill_identify::differentiate_accurately;
+use modelmill_spec::ModelActuator;
 
 use super::ServoModel;
+use super::direction::DirectionColumns;
 use super::forces::ActuatorStates;
 use super::gains::GainValues;
-use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, REVERSAL_PERIODS, SATURATION_SHARE, STANDSTILL_SHARE};
+use super::thresholds::{LARGEST_DELAY, MOST_SAMPLES, SATURATION_SHARE};
 use super::turns::turn_offset;
 use crate::along;
 use crate::error::Outcome;
@@ -27,6 +29,8 @@ pub(super) struct UsedSamples {
     pub(super) segment: RecordingSegment,
     /// `counts[row][sample]`, by position among the rows of bodies.
     pub(super) counts: Vec<Vec<bool>>,
+    /// The columns that jump at a reversal.
+    direction: DirectionColumns,
     /// The complete segment, from which delayed signals are taken.
     complete: RecordingSegment,
     /// Positions of the drives, `[drive][sample]`.
@@ -38,19 +42,22 @@ impl UsedSamples {
     ///
     /// Fails when a pose has no solution.
     pub(super) fn new(servo: &ServoModel, complete: &RecordingSegment, most: usize) -> Outcome<Self> {
+        let complete = with_accurate_derivatives(complete);
         let time = &complete.run.time;
         let start = time.first().copied().unwrap_or(0.0) + LARGEST_DELAY;
         let first = time.partition_point(|t| *t < start);
         let every = (time.len() - first).div_ceil(most.clamp(1, MOST_SAMPLES)).max(1);
         let places: Vec<usize> = (first..time.len()).step_by(every).collect();
-        let segment = pick(complete, &places);
-        let counts = counting_samples(servo, &segment)?;
+        let segment = pick(&complete, &places);
+        let direction = DirectionColumns::new(servo, &segment);
+        let counts = direction.counting_samples(servo, &segment)?;
         let [positions, _] = along::drive_motion(&servo.equations, &segment)?;
         Ok(Self {
             segment,
             counts,
+            direction,
             positions,
-            complete: complete.clone(),
+            complete,
         })
     }
 
@@ -126,16 +133,39 @@ impl UsedSamples {
             .regressor(&states)
             .map_err(|fault| segment.pose_error(model, fault, 0))?;
         let force = segment.run.force.as_deref().unwrap_or(&[]);
+        let body_rows = servo.body_rows();
         let (mut regressor, mut measured) = (Vec::new(), Vec::new());
         for sample in 0..segment.samples() {
-            for (d, counts) in servo.body_rows().into_iter().zip(&self.counts) {
-                let weight = f64::from(u8::from(counts[sample]));
-                regressor.extend(all.row(sample * n_drives + d).iter().map(|x| weight * x));
-                measured.push(weight * force.get(d).map_or(0.0, |force| force[sample]));
+            for d in &body_rows {
+                regressor.extend(all.row(sample * n_drives + d).iter());
             }
+        }
+        self.direction.filter(&mut regressor, body_rows.len(), model.base.len());
+        let forces: Vec<Option<Vec<f64>>> = body_rows
+            .iter()
+            .map(|d| Some(self.direction.filter_series(force.get(*d)?.clone())))
+            .collect();
+        let rows = (0..segment.samples()).flat_map(|sample| (0..body_rows.len()).map(move |row| (sample, row)));
+        for ((sample, row), columns) in rows.zip(regressor.chunks_exact_mut(model.base.len())) {
+            let weight = f64::from(u8::from(self.counts[row][sample]));
+            columns.iter_mut().for_each(|x| *x *= weight);
+            measured.push(weight * forces[row].as_ref().map_or(0.0, |force| force[sample]));
         }
         Ok(EquationRows { regressor, measured })
     }
+}
+
+/// A segment with derivatives that are accurate enough for equations whose terms nearly cancel. Recorded ones at uneven
+/// times stay.
+fn with_accurate_derivatives(segment: &RecordingSegment) -> RecordingSegment {
+    let mut accurate = segment.clone();
+    let run = &mut accurate.run;
+    for (q, (qd, qdd)) in run.q.iter().zip(run.qd.iter_mut().zip(&mut run.qdd)) {
+        if let Some([rates, accelerations]) = differentiate_accurately(&run.time, q) {
+            (*qd, *qdd) = (rates, accelerations);
+        }
+    }
+    accurate
 }
 
 /// A segment with some of its samples.
@@ -157,61 +187,6 @@ fn pick(segment: &RecordingSegment, places: &[usize]) -> RecordingSegment {
     picked.weights = None;
     picked.load = None;
     picked
-}
-
-/// Which equations count: forces that were measured and, where friction has a direction, drives that move. Around a
-/// reversal the filter mixes both directions.
-fn counting_samples(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<Vec<Vec<bool>>> {
-    let run = &segment.run;
-    let rates = along::drive_rates(&servo.equations, segment)?;
-    let has_direction = has_direction(servo);
-    Ok(servo
-        .body_rows()
-        .into_iter()
-        .map(|d| {
-            let moving = moving_samples(&run.time, &rates[d], run.prepared.cutoff_hz);
-            (0..run.samples())
-                .map(|sample| run.is_force_measured(d, sample) && (!has_direction || moving[sample]))
-                .collect()
-        })
-        .collect())
-}
-
-/// At which samples a drive moves in one direction: its rate is no standstill, and the filter of the cut-off, in Hz, mixes
-/// in no other direction.
-fn moving_samples(time: &[f64], rates: &[f64], cutoff_hz: Option<f64>) -> Vec<bool> {
-    let width = cutoff_hz.map_or(0.0, |cutoff| REVERSAL_PERIODS / cutoff);
-    let n = rates.len().max(1) as f64;
-    let rms = (rates.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-    let least = STANDSTILL_SHARE * rms;
-    let is_moving = |sample: usize| rates[sample].abs() > least.max(slope(time, rates, sample).abs() * width);
-    (0..rates.len()).map(is_moving).collect()
-}
-
-/// The derivative of a column by the differences to its neighbours.
-fn slope(time: &[f64], column: &[f64], sample: usize) -> f64 {
-    let (a, b) = (sample.saturating_sub(1), (sample + 1).min(column.len() - 1));
-    if a == b {
-        0.0
-    } else {
-        (column[b] - column[a]) / (time[b] - time[a])
-    }
-}
-
-/// Whether an effect depends on the direction of a motion.
-fn has_direction(servo: &ServoModel) -> bool {
-    fn has_sign(expression: &ExactExpression) -> bool {
-        match expression {
-            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
-            ExactExpression::Sum(all) | ExactExpression::Product(all) => all.iter().any(has_sign),
-            ExactExpression::Quotient(a, b) => has_sign(a) || has_sign(b),
-            ExactExpression::Negative(a) | ExactExpression::Power(a, _) => has_sign(a),
-            ExactExpression::Apply(function, a) => *function == ExactFunction::Sign || has_sign(a),
-        }
-    }
-    let effects = servo.equations.derivation.mechanism.effects.iter();
-    let mut terms = effects.flat_map(|effect| &effect.terms);
-    terms.any(|term| has_sign(&term.expression))
 }
 
 /// Position, rate and acceleration of a signal at a time between its samples: cubic polynomials through values and

@@ -12,6 +12,7 @@ use modelmill_identify::estimate::LeastSquares;
 use modelmill_spec::ModelActuator;
 
 use super::ServoModel;
+use super::direction::samples_between_reversals;
 use super::forces::ActuatorStates;
 use super::gains::GainValues;
 use super::rows::UsedSamples;
@@ -156,12 +157,13 @@ impl DriveEquations {
             let used = UsedSamples::new(servo, segment, DELAY_SAMPLES / segments.len().max(1))?;
             let delayed = used.delayed(servo, delays);
             let own = without_signals(model, &delayed);
+            let counts = &samples_between_reversals(servo, &used.segment)?[row];
             let states = own.states(0, own.samples());
             let regressor = ModelEvaluator::new(&model.derivation)
                 .regressor(&states)
                 .map_err(|fault| own.pose_error(model, fault, 0))?;
             let [positions, rates] = along::drive_motion(model, &own)?;
-            for sample in (0..own.samples()).filter(|sample| used.counts[row][*sample]) {
+            for sample in (0..own.samples()).filter(|sample| counts[*sample]) {
                 let (position, rate) = (positions[drive][sample], rates[drive][sample]);
                 let usual = [1.0, rate, rate.signum(), rate * rate.abs(), position];
                 all.force_rows.push(

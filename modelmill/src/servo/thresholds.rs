@@ -19,6 +19,8 @@ pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
 pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
 /// Gauss-Newton steps of delays with instruments at most; some three suffice.
 pub(super) const DELAY_ITERATIONS: usize = 6;
+/// Shares of the first estimates of delays at which the steps begin again. By judgement.
+pub(super) const DELAY_RESTARTS: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0];
 /// Change of a delay, s, below which it is known. By judgement: a hundredth of a sample at 1 kHz.
 pub(super) const DELAY_TOLERANCE: f64 = 1e-5;
 /// Most samples for the search of a delay. By judgement.
@@ -31,6 +33,17 @@ pub(super) const STANDSTILL_SHARE: f64 = 0.02;
 /// Samples nearer to a reversal than this many periods of the filter's cut-off are left out: the filter mixes both
 /// directions of the friction there. By judgement.
 pub(super) const REVERSAL_PERIODS: f64 = 1.0;
+/// As [`REVERSAL_PERIODS`], where the columns of friction pass the same filter: what remains is that friction at a reversal
+/// is no sign. Chosen with MuJoCo's friction, which turns 9 ms early, and encoders of 12 and 18 bits at cut-offs of 6 to
+/// 20 Hz: with a quarter, dry friction is up to 10 % too small; with one period its deviations are twice as large.
+pub(super) const FILTERED_REVERSAL_PERIODS: f64 = 0.5;
+/// A drive whose rate is below this share of its rms rate for [`STANDING_PERIODS`] stands. By judgement.
+pub(super) const STANDING_SHARE: f64 = 0.05;
+/// Periods of the filter's cut-off: in less, a filtered rate passes zero without a standstill. By judgement.
+pub(super) const STANDING_PERIODS: f64 = 0.5;
+/// Periods of the filter's cut-off at both ends of a recording in which filtered columns have transients. By judgement:
+/// transients fall tenfold in each period.
+pub(super) const TRANSIENT_PERIODS: f64 = 2.0;
 /// Lags of the commands from which instruments are formed, s. A servo follows its command within some tenths of a
 /// second. By judgement.
 pub(super) const INSTRUMENT_LAGS: [f64; 8] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.24, 0.32];
