@@ -43,8 +43,8 @@ impl ParameterSource {
         Ok(self.load_values(host, model)?.values)
     }
 
-    /// Values with their origin, for [`Self::values`] and [`Self::apply_to`]. Prints the remarks.
-    fn load_values(&self, host: &Host, model: &Model) -> CommandOutcome<BaseParameterValues> {
+    /// The values with covariance and gains. Remarks go to standard error.
+    pub(crate) fn load_values(&self, host: &Host, model: &Model) -> CommandOutcome<BaseParameterValues> {
         let values = match self {
             Self::Nominal => model.base_parameter_values(),
             Self::Fit(path) => {

@@ -240,3 +240,30 @@ fn commands_need_actuators_and_their_signals() {
     let says = refused(1, &["simulate", &arm, "--command", &log, "--out", &out]);
     assert!(says.contains("no column for shoulder_servo, elbow_servo"), "{says}");
 }
+
+/// The forces of a log of servos follow from the gains of the fit, and not from wrong ones of the file.
+#[test]
+fn compare_uses_the_gains_of_a_fit() {
+    let arm = scratch("servo_arm_3.toml");
+    let recordings = workspace("recordings/servo-arm");
+    let description = recordings.join("servo_arm.xml").display().to_string();
+    ran(&["import", &description, "--known-bodies", "--out", &arm]);
+    let mut text = std::fs::read_to_string(&arm).expect("the model");
+    assert!(text.contains("kp = 20.0") && !text.contains("[parameters]"), "{text}");
+    text = text.replace("kp = 20.0", "kp = \"kp1\"");
+    text.push_str("\n[parameters]\nkp1 = { unit = \"N m\", nominal = 40 }\n");
+    for drive in ["shoulder_drive", "elbow_drive"] {
+        let _ = write!(text, "\n[[effect]]\nkind = \"coulomb_friction\"\nat = [\"{drive}\"]\n");
+    }
+    std::fs::write(&arm, text).expect("written");
+    let [data, check] = ["fit.csv", "check.csv"].map(|name| recordings.join(name).display().to_string());
+    let fit = scratch("servo_arm_3.json");
+    ran(&["identify", &arm, "--data", &data, "--out", &fit]);
+    let error = |parameters: &str| {
+        let told = json(&["compare", &arm, "--data", &check, "--parameters", parameters, "--json"]);
+        told["nrms"].as_f64().expect("a number")
+    };
+    let [of_file, of_fit] = ["nominal", &fit].map(error);
+    println!("error of the file {of_file}, of the fit {of_fit}");
+    assert!(of_fit < 0.03 && of_file > 0.2, "{of_fit} {of_file}");
+}

@@ -162,7 +162,7 @@ impl ServoIdentification {
         lines.push(String::new());
         lines.extend(self.parameter_table());
         lines.push(
-            "  The standard deviations (std) contain noise and the uncertainty of delays, not the error of numeric derivatives."
+            "  The standard deviations (std) contain noise and the uncertainty of delays, not errors of the model."
                 .to_owned(),
         );
         lines.push(String::new());

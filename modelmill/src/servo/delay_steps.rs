@@ -24,23 +24,22 @@ pub(super) struct DelayColumns {
     pub(super) values: Vec<f64>,
 }
 
-/// Improves the delays that the file does not give. Those stay that the equations do not determine, and all of them if
-/// the steps do not converge.
+/// Improves the delays that the file does not give, from equations that may be fewer than those of the estimate.
 ///
-/// A servo that follows its command nearly without error has two solutions: a longer delay with a smaller damping and a
+/// A servo that follows its command nearly without error has several solutions: a longer delay with a smaller damping and a
 /// negative inertia satisfies the equations nearly as well. If an estimate has an impossible sign, the steps begin again
 /// at shorter delays of its drive, and the solution whose signs are least impossible is taken.
 ///
 /// Fails when a pose has no solution.
-pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
-    let estimated: Vec<usize> = (0..delays.len()).filter(|k| delays[*k].interval.is_some()).collect();
+pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
+    let estimated = estimated(delays);
     if estimated.is_empty() {
         return Ok(());
     }
     let actuators = system.servo.actuators();
     let first_estimates = delays.to_vec();
-    step_to_solution(system, delays, &estimated)?;
-    let mut negative = negative_rows(system, delays)?;
+    refine_by_instruments(system, delays)?;
+    let mut negative = negative_drives(system, delays)?;
     for share in DELAY_RESTARTS {
         if negative.is_empty() {
             break;
@@ -52,8 +51,19 @@ pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [Serv
         {
             other[*k].value = share * first_estimates[*k].value;
         }
-        step_to_solution(system, &mut other, &estimated)?;
-        let others = negative_rows(system, &other)?;
+        let start = other.clone();
+        if !step_to_solution(system, &mut other, &estimated)? {
+            // The equations do not decide between this delay and the first estimate.
+            other = start;
+            for (one, first) in other.iter_mut().zip(&first_estimates) {
+                let distance = (first.value - one.value).abs();
+                if distance > 0.0 {
+                    one.std = distance / HALF_INTERVAL;
+                    one.interval = Some([(one.value - distance).max(0.0), one.value + distance]);
+                }
+            }
+        }
+        let others = negative_drives(system, &other)?;
         if others.values().sum::<f64>() < negative.values().sum::<f64>() {
             negative = others;
             delays.clone_from_slice(&other);
@@ -62,9 +72,27 @@ pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [Serv
     Ok(())
 }
 
+/// Improves delays that are nearly right. Those stay that the equations do not determine, and all of them if the steps do
+/// not converge: they are worse than the estimate with which they began.
+///
+/// Fails when a pose has no solution.
+pub(super) fn refine_by_instruments(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
+    let estimated = estimated(delays);
+    let mut refined = delays.to_vec();
+    if !estimated.is_empty() && step_to_solution(system, &mut refined, &estimated)? {
+        delays.clone_from_slice(&refined);
+    }
+    Ok(())
+}
+
+/// The delays that the file does not give, by place.
+fn estimated(delays: &[ServoDelay]) -> Vec<usize> {
+    (0..delays.len()).filter(|k| delays[*k].interval.is_some()).collect()
+}
+
 /// The drives in whose equations estimates are negative that must be positive, with the sum of the squares of these
 /// estimates in standard deviations.
-fn negative_rows(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTreeMap<usize, f64>> {
+fn negative_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTreeMap<usize, f64>> {
     let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
     let solved = system.solve(&values)?;
     let body_rows = system.servo.body_rows();
@@ -82,9 +110,8 @@ fn negative_rows(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTr
     Ok(negative)
 }
 
-/// Gauss-Newton steps of some delays, given by place, from their present values.
-fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimated: &[usize]) -> Outcome {
-    let first_estimates = delays.to_vec();
+/// Gauss-Newton steps of some delays, given by place, from their present values. Returns whether they converged.
+fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimated: &[usize]) -> Outcome<bool> {
     let mut last_step = f64::INFINITY;
     for _ in 0..DELAY_ITERATIONS {
         let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
@@ -125,11 +152,7 @@ fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimat
             break;
         }
     }
-    // Steps that do not converge are worse than the estimate with which they began.
-    if last_step > DELAY_STEP {
-        delays.clone_from_slice(&first_estimates);
-    }
-    Ok(())
+    Ok(last_step <= DELAY_STEP)
 }
 
 /// The change of all equations by the delays of some actuators.

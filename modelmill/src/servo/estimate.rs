@@ -6,7 +6,9 @@
 
 use modelmill_boundary::message;
 use modelmill_identify::estimate::{EstimateOptions, RowVisitor, estimate, estimate_with_instruments};
-use modelmill_identify::{FitFile, LeastSquaresError, ParameterUncertainty, RecordingNote, RegressionSolution};
+use modelmill_identify::{
+    FitFile, LeastSquaresError, ParameterUncertainty, RecordingNote, RegressionSolution, float_to_count,
+};
 
 use modelmill_spec::Sign;
 
@@ -14,13 +16,14 @@ use nalgebra::{DMatrix, DVector};
 
 use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
-use super::delay_steps::{DelayColumns, refine_by_instruments};
+use super::delay_steps::{DelayColumns, find_delays, refine_by_instruments};
 use super::gains::GainValues;
 use super::instruments::{commanded_segment, project_on_instruments};
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
 use super::thresholds::{
-    IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR, MOST_SAMPLES, SATURATION_PASSES,
+    DELAY_SAMPLES, DELAY_SAMPLES_PER_PERIOD, IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR,
+    MOST_SAMPLES, SATURATION_PASSES,
 };
 use super::turns::turn_sentence;
 use crate::error::{Error, Outcome};
@@ -130,7 +133,7 @@ impl ServoModel {
         let (fit, check) = (segments(fit), segments(check));
         self.check_length(&fit)?;
         let mut delays = delays(self, &fit, DelayQuery::OfModel)?;
-        let mut system = ServoSystem::new(self, &fit)?;
+        let mut system = ServoSystem::new(self, &fit, MOST_SAMPLES)?;
         if system.unknown.is_empty() {
             return Err(Error::input(format!(
                 "{}: every base parameter and gain is a number of the file, so there is nothing to identify; compare the \
@@ -138,6 +141,7 @@ impl ServoModel {
                 self.equations.path
             )));
         }
+        find_delays(&ServoSystem::new(self, &fit, delay_samples(&fit))?, &mut delays)?;
         refine_by_instruments(&system, &mut delays)?;
         let mut values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
         let mut solved = system.solve(&values)?;
@@ -155,7 +159,7 @@ impl ServoModel {
         let checked = if check.is_empty() {
             Vec::new()
         } else {
-            let mut system = ServoSystem::new(self, &check)?;
+            let mut system = ServoSystem::new(self, &check, MOST_SAMPLES)?;
             system.leave_out_saturated(&values, &solved)?;
             system.row_errors(&system.equations(&values)?.0, &base)
         };
@@ -226,10 +230,10 @@ pub(super) struct ServoSolution {
 }
 
 impl<'a> ServoSystem<'a> {
-    /// Selects samples and unknowns.
-    fn new(servo: &'a ServoModel, segments: &[RecordingSegment]) -> Outcome<Self> {
+    /// Selects at most `most` samples of all segments, and the unknowns.
+    fn new(servo: &'a ServoModel, segments: &[RecordingSegment], most: usize) -> Outcome<Self> {
         let model = &servo.equations;
-        let most = MOST_SAMPLES / segments.len().max(1);
+        let most = most / segments.len().max(1);
         let samples = segments
             .iter()
             .map(|one| UsedSamples::new(servo, one, most))
@@ -596,6 +600,15 @@ impl<'a> ServoSystem<'a> {
             })
             .collect()
     }
+}
+
+/// Number of samples with which delays are searched: enough for the filter of the motion.
+fn delay_samples(segments: &[RecordingSegment]) -> usize {
+    let of = |segment: &RecordingSegment| match (segment.run.time.as_slice(), segment.run.prepared.cutoff_hz) {
+        ([first, .., last], Some(cutoff)) => float_to_count(DELAY_SAMPLES_PER_PERIOD * cutoff * (last - first)),
+        _ => 0,
+    };
+    segments.iter().map(of).sum::<usize>().max(DELAY_SAMPLES)
 }
 
 impl EquationRows {

@@ -56,8 +56,8 @@ impl UsedSamples {
             segment,
             counts,
             direction,
-            positions,
             complete,
+            positions,
         })
     }
 
@@ -148,7 +148,9 @@ impl UsedSamples {
         let rows = (0..segment.samples()).flat_map(|sample| (0..body_rows.len()).map(move |row| (sample, row)));
         for ((sample, row), columns) in rows.zip(regressor.chunks_exact_mut(model.base.len())) {
             let weight = f64::from(u8::from(self.counts[row][sample]));
-            columns.iter_mut().for_each(|x| *x *= weight);
+            for x in columns {
+                *x *= weight;
+            }
             measured.push(weight * forces[row].as_ref().map_or(0.0, |force| force[sample]));
         }
         Ok(EquationRows { regressor, measured })

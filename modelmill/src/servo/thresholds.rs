@@ -20,9 +20,11 @@ pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
 /// Gauss-Newton steps of delays with instruments at most; some three suffice.
 pub(super) const DELAY_ITERATIONS: usize = 6;
 /// Shares of the first estimates of delays at which the steps begin again. By judgement.
-pub(super) const DELAY_RESTARTS: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0];
+pub(super) const DELAY_RESTARTS: [f64; 4] = [0.7, 0.45, 0.2, 0.0];
 /// Change of a delay, s, below which it is known. By judgement: a hundredth of a sample at 1 kHz.
 pub(super) const DELAY_TOLERANCE: f64 = 1e-5;
+/// Samples for each period of the filter's cut-off that a search for delays needs at least. By judgement.
+pub(super) const DELAY_SAMPLES_PER_PERIOD: f64 = 6.0;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.

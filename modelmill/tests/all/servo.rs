@@ -253,6 +253,66 @@ fn a_small_known_load_fixes_the_scale_without_bias() {
     }
 }
 
+/// The filter of the motion rounds the jumps of dry friction. An estimate that ignores this grows as the cut-off falls.
+#[test]
+fn dry_friction_does_not_depend_on_the_cutoff() {
+    let planted = Planted {
+        j: 0.03,
+        ml: 0.15,
+        kp: 18.0,
+        kd: 0.9,
+        viscous: 0.2,
+        coulomb: 0.15,
+        delay: 0.012,
+    };
+    let servo = servo(&pendulum(&[("ml", planted.ml)]));
+    let log = simulate(&planted, 7, 6000);
+    for cutoff in [6.0, 9.0, 14.0] {
+        let mut reading = options();
+        reading.preparation.cutoff_hz = Some(cutoff);
+        let run = servo
+            .equations
+            .recording_of_table("log", log.clone(), &reading)
+            .unwrap();
+        let found = servo.identify(&[&run], &[]).unwrap();
+        for (expression, truth) in [("Fc_motor", planted.coulomb), ("J", planted.j), ("kp", planted.kp)] {
+            let (value, std) = value(&found, expression);
+            assert!(
+                (value / truth - 1.0).abs() < 0.03,
+                "{cutoff} Hz: {expression} {value} +- {std}"
+            );
+        }
+    }
+}
+
+/// The equations of a stiff servo are nearly satisfied by a longer delay with a negative inertia, too.
+#[test]
+fn a_stiff_servo_gets_the_delay_with_a_possible_inertia() {
+    let planted = Planted {
+        j: 0.08,
+        ml: 0.5,
+        kp: 500.0,
+        kd: 20.0,
+        viscous: 1.0,
+        coulomb: 0.8,
+        delay: 0.012,
+    };
+    let servo = servo(&pendulum(&[("ml", planted.ml)]));
+    for seed in 60..66 {
+        let found = identify(&servo, by_encoder(simulate(&planted, seed, 5000)));
+        let (inertia, std) = value(&found, "J");
+        let delay = &found.delays[0];
+        assert!(
+            inertia > 0.0 && (inertia - planted.j).abs() < 3.0 * std,
+            "{seed} {inertia} +- {std}"
+        );
+        assert!(
+            (delay.value - planted.delay).abs() < (3.0 * delay.std).min(0.004),
+            "{seed} {delay:?}"
+        );
+    }
+}
+
 /// A command in another turn than the position is the same command.
 #[test]
 fn full_turns_between_command_and_position_have_no_effect() {
