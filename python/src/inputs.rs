@@ -37,6 +37,7 @@ pub(crate) enum PythonInput<'py> {
 pub(crate) type RecordingOrError = (Option<PythonRecording>, Option<PyErr>);
 
 /// A recording that is to be prepared, independent of the interpreter.
+#[derive(Clone)]
 pub(crate) enum PassedRecording {
     /// Files of one run.
     Files(Vec<PathBuf>, RecordingOptions),
@@ -65,6 +66,15 @@ impl PassedRecording {
                 Self::Table(name.to_owned(), columns.collect(), reading)
             }
         })
+    }
+
+    /// With other options, which follow from the given ones; a recording that was read before stays.
+    pub(crate) fn with_reading(self, change: impl Fn(&RecordingOptions) -> RecordingOptions) -> Self {
+        match self {
+            Self::Files(files, reading) => Self::Files(files, change(&reading)),
+            Self::Table(name, columns, reading) => Self::Table(name, columns, change(&reading)),
+            Self::Read(recording) => Self::Read(recording),
+        }
     }
 
     /// Reads it for a model.

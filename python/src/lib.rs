@@ -13,6 +13,7 @@ mod model;
 mod options;
 mod results;
 mod rigs;
+mod servo;
 mod states;
 mod wording;
 mod work;
@@ -32,6 +33,8 @@ mod _core {
     use crate::results::{PythonExcitation, PythonRecording, PythonResult};
     #[pymodule_export]
     use crate::rigs::{PythonSimulation, reduce, simulate};
+    #[pymodule_export]
+    use crate::servo::{compare_forward, identify_signals, simulate_motion, with_fit};
     #[pymodule_export]
     use crate::states::{at_single, drive_units, forces_along, model_contents};
     #[pymodule_export]

@@ -16,7 +16,7 @@ use modelmill::runs::UnreadRun;
 use modelmill::states::{ModelFunction, ModelFunctions, StateSamples};
 use modelmill::text::style::TerminalStyle;
 use modelmill::variants::VariantComparison;
-use modelmill::{Error, FitFile, Host, Model, Outcome, RecordingNote, export, import};
+use modelmill::{Error, FitFile, Host, Model, Outcome, export, import};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -157,7 +157,7 @@ impl CoreModel {
     }
 
     /// Reads a fit from a text with a name, or from a file.
-    fn fit(&self, text: Option<&str>, name: &str) -> Outcome<FitFile> {
+    pub(crate) fn fit(&self, text: Option<&str>, name: &str) -> Outcome<FitFile> {
         let host = self.model.host();
         match text {
             Some(text) => host.fit_of_text(text, name),
@@ -182,7 +182,7 @@ impl CoreModel {
     }
 
     /// Another model of the same host.
-    fn with_same_host(&self, model: Model) -> Self {
+    pub(crate) fn with_same_host(&self, model: Model) -> Self {
         Self::new(model, Arc::clone(&self.listener))
     }
 
@@ -585,23 +585,13 @@ impl CoreModel {
         Ok(self.with_same_host(self.model.with_values(&values)))
     }
 
-    /// Values of a fit that `identify` wrote to a file.
-    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, RemarkList)> {
+    /// Values of a fit that `identify` wrote to a file, and whether it has gains of actuators.
+    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, bool, RemarkList)> {
         let found = run_blocking(py, || {
             let fit = self.model.host().fit(&path)?;
             self.model.values_of(&fit, &path.display().to_string())
         })?;
-        let mut notes = remarks(&found.notes);
-        if !found.gains.is_empty() {
-            let names: Vec<&str> = found.gains.iter().map(|(name, _)| name.as_str()).collect();
-            let says = format!(
-                "{} has values of {}, which are not used here; write them into the model file with `adopt`",
-                path.display(),
-                names.join(", ")
-            );
-            notes.extend(remarks(&[RecordingNote::warning(says)]));
-        }
-        Ok((found.values, notes))
+        Ok((found.values, !found.gains.is_empty(), remarks(&found.notes)))
     }
 
     /// Physical parameters from a fit, which is a text with a name or the path of a file.

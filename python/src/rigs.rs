@@ -6,62 +6,56 @@ use modelmill::reduce::RigReductionOptions;
 use modelmill::text::table::count;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::model::new_host;
 use crate::results::{PythonResult, RemarkList};
 use crate::work::run_interruptible;
 
-/// The recording of a simulated rig.
+/// A simulated recording.
 #[pyclass(frozen, name = "Simulation")]
 pub(crate) struct PythonSimulation {
-    /// The simulation of the library.
-    made: modelmill::simulate::RigSimulation,
+    /// What was simulated, as JSON.
+    pub(crate) json: Value,
+    /// The simulation in one line.
+    pub(crate) text: String,
+    /// The recording as CSV.
+    pub(crate) csv: String,
+    /// Names and values of the columns, in SI units.
+    pub(crate) columns: Vec<(String, Vec<f64>)>,
+    /// Remarks.
+    pub(crate) notes: RemarkList,
 }
 
 #[pymethods]
 impl PythonSimulation {
-    /// Rig, number of samples, seed, columns and notes as JSON.
+    /// What was simulated, as JSON.
     #[getter]
     fn json(&self) -> String {
-        let made = &self.made;
-        let columns = made.run.columns.iter();
-        let columns: Vec<&str> = columns.map(|(name, _)| name.as_str()).collect();
-        json!({
-            "rig": made.rig,
-            "samples": made.samples(),
-            "seed": made.seed,
-            "columns": columns,
-            "notes": made.notes,
-        })
-        .to_string()
+        self.json.to_string()
     }
 
     /// The simulation in one line.
     #[getter]
-    fn text(&self) -> String {
-        let made = &self.made;
-        let samples = count(made.samples(), "sample", "samples");
-        let drives = made.drives.join(", ");
-        format!("{}: {samples} of {drives}, seed {}", made.rig, made.seed)
+    fn text(&self) -> &str {
+        &self.text
     }
 
     /// Remarks, each with severity and text.
     #[getter]
     fn notes(&self) -> RemarkList {
-        let notes = self.made.notes.iter();
-        notes.map(|says| ("info", says.clone())).collect()
+        self.notes.clone()
     }
 
     /// The recording as CSV.
     #[getter]
-    fn csv(&self) -> String {
-        self.made.csv()
+    fn csv(&self) -> &str {
+        &self.csv
     }
 
     /// Names and values of the columns, in SI units.
     fn columns<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, PyArray1<f64>>)> {
-        let columns = self.made.run.columns.iter();
+        let columns = self.columns.iter();
         columns
             .map(|(name, values)| (name.clone(), PyArray1::from_slice(py, values)))
             .collect()
@@ -82,7 +76,27 @@ pub(crate) fn simulate(
     let made = run_interruptible(py, &listener, progress.as_ref(), || {
         host.simulate(&rig, &trajectory, &columns, seed)
     })?;
-    Ok(PythonSimulation { made })
+    let columns = made.run.columns.iter();
+    let columns: Vec<&str> = columns.map(|(name, _)| name.as_str()).collect();
+    let samples = count(made.samples(), "sample", "samples");
+    Ok(PythonSimulation {
+        json: json!({
+            "rig": made.rig,
+            "samples": made.samples(),
+            "seed": made.seed,
+            "columns": columns,
+            "notes": made.notes,
+        }),
+        text: format!(
+            "{}: {samples} of {}, seed {}",
+            made.rig,
+            made.drives.join(", "),
+            made.seed
+        ),
+        csv: made.csv(),
+        notes: made.notes.iter().map(|says| ("info", says.clone())).collect(),
+        columns: made.run.columns,
+    })
 }
 
 /// Reduces a rig to a planar model. Returns the report on all assumptions, and the text of the model file.

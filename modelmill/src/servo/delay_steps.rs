@@ -27,8 +27,9 @@ pub(super) struct DelayColumns {
 /// Improves the delays that the file does not give, from equations that may be fewer than those of the estimate.
 ///
 /// A servo that follows its command nearly without error has several solutions: a longer delay with a smaller damping and a
-/// negative inertia satisfies the equations nearly as well. If an estimate has an impossible sign, the steps begin again
-/// at shorter delays of its drive, and the solution whose signs are least impossible is taken.
+/// negative inertia satisfies the equations nearly as well. If an estimate has an impossible sign, or a delay is at the end
+/// of the search, the steps begin again at shorter delays of the drive, and the solution whose signs are least impossible
+/// is taken.
 ///
 /// Fails when a pose has no solution.
 pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -> Outcome {
@@ -39,17 +40,18 @@ pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -
     let actuators = system.servo.actuators();
     let first_estimates = delays.to_vec();
     refine_by_instruments(system, delays)?;
-    let mut negative = negative_drives(system, delays)?;
+    let mut impossible = impossible_drives(system, delays)?;
     for share in DELAY_RESTARTS {
-        if negative.is_empty() {
+        if impossible.is_empty() {
             break;
         }
         let mut other = delays.to_vec();
         for k in estimated
             .iter()
-            .filter(|k| negative.contains_key(&actuators[**k].drive.0))
+            .filter(|k| impossible.contains_key(&actuators[**k].drive.0))
         {
             other[*k].value = share * first_estimates[*k].value;
+            other[*k].is_open = false;
         }
         let start = other.clone();
         if !step_to_solution(system, &mut other, &estimated)? {
@@ -63,9 +65,9 @@ pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -
                 }
             }
         }
-        let others = negative_drives(system, &other)?;
-        if others.values().sum::<f64>() < negative.values().sum::<f64>() {
-            negative = others;
+        let others = impossible_drives(system, &other)?;
+        if others.values().sum::<f64>() < impossible.values().sum::<f64>() {
+            impossible = others;
             delays.clone_from_slice(&other);
         }
     }
@@ -91,13 +93,15 @@ fn estimated(delays: &[ServoDelay]) -> Vec<usize> {
 }
 
 /// The drives in whose equations estimates are negative that must be positive, with the sum of the squares of these
-/// estimates in standard deviations.
-fn negative_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTreeMap<usize, f64>> {
+/// estimates in standard deviations; infinite for a drive whose delay is at the end of the search.
+fn impossible_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTreeMap<usize, f64>> {
     let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
     let solved = system.solve(&values)?;
     let body_rows = system.servo.body_rows();
     let width = system.servo.equations.base.len();
-    let mut negative = BTreeMap::new();
+    let at_end = delays.iter().zip(system.servo.actuators());
+    let at_end = at_end.filter(|(delay, _)| delay.is_open);
+    let mut impossible: BTreeMap<usize, f64> = at_end.map(|(_, one)| (one.drive.0, f64::INFINITY)).collect();
     for (k, sigmas) in system.negative_estimates(&solved) {
         let mut squares = vec![0.0; body_rows.len()];
         for (i, row) in solved.equations.regressor.chunks_exact(width).enumerate() {
@@ -105,9 +109,9 @@ fn negative_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<B
         }
         // A parameter belongs to the drive in whose equation it has the largest effect.
         let largest = (0..squares.len()).max_by(|a, b| squares[*a].total_cmp(&squares[*b]));
-        *negative.entry(largest.map_or(0, |row| body_rows[row])).or_insert(0.0) += sigmas * sigmas;
+        *impossible.entry(largest.map_or(0, |row| body_rows[row])).or_insert(0.0) += sigmas * sigmas;
     }
-    Ok(negative)
+    Ok(impossible)
 }
 
 /// Gauss-Newton steps of some delays, given by place, from their present values. Returns whether they converged.

@@ -20,7 +20,7 @@ pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
 /// Gauss-Newton steps of delays with instruments at most; some three suffice.
 pub(super) const DELAY_ITERATIONS: usize = 6;
 /// Shares of the first estimates of delays at which the steps begin again. By judgement.
-pub(super) const DELAY_RESTARTS: [f64; 4] = [0.7, 0.45, 0.2, 0.0];
+pub(super) const DELAY_RESTARTS: [f64; 5] = [0.7, 0.45, 0.2, 0.1, 0.0];
 /// Change of a delay, s, below which it is known. By judgement: a hundredth of a sample at 1 kHz.
 pub(super) const DELAY_TOLERANCE: f64 = 1e-5;
 /// Samples for each period of the filter's cut-off that a search for delays needs at least. By judgement.
@@ -59,7 +59,7 @@ pub(super) const PROJECTION_RIDGE: f64 = 1e-12;
 /// A value of an impossible sign is reported if it is this many standard deviations beyond zero. By judgement.
 pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
 /// A balance error above this share of the force of a drive (1) is reported. By judgement: the EMPS axis has 0.044 on
-/// the fitted recording and 0.089 on another one.
+/// the fitted recording and 0.090 on another one.
 pub(super) const LARGE_BALANCE_ERROR: f64 = 0.1;
 /// Most samples of the estimate; more are thinned evenly. By judgement.
 pub(super) const MOST_SAMPLES: usize = 40_000;

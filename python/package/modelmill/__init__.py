@@ -27,8 +27,10 @@ from ._results import (
     Parameter,
     Result,
     Runs,
+    ServoFit,
+    Simulation,
 )
-from ._rigs import Reduction, Simulation, reduce, simulate
+from ._rigs import Reduction, reduce, simulate
 
 __version__ = "0.1.0"
 
@@ -54,6 +56,7 @@ __all__ = [
     "Reduction",
     "Result",
     "Runs",
+    "ServoFit",
     "Simulation",
     "fleet",
     "kinds",

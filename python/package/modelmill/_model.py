@@ -34,6 +34,7 @@ from ._results import (
     Remarks,
     Result,
     Runs,
+    Simulation,
     frame,
     number,
     table_html,
@@ -526,7 +527,7 @@ class Model:
             path = os.fspath(parameters)
             if path == "nominal":
                 return self._values(None)
-            values, notes = self._core.values_of_fit(path)
+            values, _, notes = self._core.values_of_fit(path)
             _warn(notes, 4)
             return np.array(values), path
         if isinstance(parameters, Mapping):
@@ -940,7 +941,13 @@ class Model:
 
     @with_keywords((READING, ReadingOptions))
     def compare(
-        self, data: Source, *, parameters: Values = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
+        self,
+        data: Source,
+        *,
+        parameters: Values = None,
+        forward: bool = False,
+        progress: Progress = None,
+        **reading: Unpack[ReadingOptions],
     ) -> Comparison:
         """Compares the model with recordings: size of the error, and where it occurs.
 
@@ -950,14 +957,50 @@ class Model:
             A recording as :meth:`recording` takes it, or a list of them.
         parameters : optional
             Values of the base parameters; nominal ones if not given.
+        forward : bool
+            Also simulate the model forward in time from recorded states, and compare positions over horizons of 0.1 s, 1 s and
+            the whole run.
         progress : callable or bool, optional
             Called as ``progress(what, done, total)``; False is silent.
         **reading
             See :class:`ReadingOptions`.
         """
         values, name = self._values(parameters)
-        read, _ = self._recordings(data, None, reading, progress)
-        return Comparison(_answered(progress, lambda hears: self._core.compare(read, values, name, hears)))
+        model = self._with_gains(parameters)
+        read, _ = model._recordings(data, None, reading, progress)
+        compared = _answered(progress, lambda hears: model._core.compare(read, values, name, hears))
+        if not forward:
+            return Comparison(compared)
+        return Comparison(
+            compared, _answered(progress, lambda hears: _core.compare_forward(model._core, read, values, hears))
+        )
+
+    @with_keywords((READING, ReadingOptions))
+    def simulate(
+        self, data: Source, *, parameters: Values = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
+    ) -> Simulation:
+        """Simulates the model forward in time from the first state of a recording.
+
+        The motion follows from the recorded forces. Without force columns it follows from the commands or other signals of
+        the actuators of the model file; to use these for a recording with forces, leave its force columns out.
+
+        Parameters
+        ----------
+        data
+            A recording as :meth:`recording` takes it, without gaps in time.
+        parameters : optional
+            Values of the base parameters, and of gains if they are a fit; nominal ones if not given.
+        progress, **reading
+            As for :meth:`compare`.
+        """
+        values, _ = self._values(parameters)
+        model = self._with_gains(parameters)
+        read, _ = model._recordings(data, None, reading, progress)
+        if len(read) != 1:
+            raise ModelmillError("simulate() needs one recording: pass one of the list")
+        return Simulation(
+            _answered(progress, lambda hears: _core.simulate_motion(model._core, read[0], values, hears))
+        )
 
     @with_keywords((ESTIMATION, EstimationOptions), (READING, ReadingOptions))
     def identify(
@@ -972,6 +1015,10 @@ class Model:
     ) -> Identification:
         """Identifies base parameters from recordings by least squares.
 
+        If the model has actuators and the recordings have their signals (commands, currents, voltages), these replace forces:
+        base parameters, gains and delays are estimated by instrumental variables, and :attr:`Identification.signals` has the
+        gains and delays. The options of estimators are then refused.
+
         Parameters
         ----------
         data, check
@@ -984,6 +1031,9 @@ class Model:
         _refuse_unknown(options, ESTIMATION, READING)
         estimation = {name: one for name, one in options.items() if name in ESTIMATION}
         reading = {name: one for name, one in options.items() if name in READING}
+        signals = self._identified_signals(data, check, reading, list(estimation), instruments is not None, progress)
+        if signals is not None:
+            return signals
         # A bound of the user belongs to the estimator, which applies it to the equations of the fit only.
         standstill = reading.get("standstill")
         others = {name: one for name, one in reading.items() if name != "standstill"}
@@ -996,6 +1046,42 @@ class Model:
             lambda hears: self._core.identify(read, checked, estimation, bound, recorded, instrument_period, hears),
         )
         return Identification(found, self)
+
+    def _identified_signals(
+        self,
+        data: Source,
+        check: Source,
+        reading: Mapping[str, Any],
+        unused: list[str],
+        has_instruments: bool,
+        progress: Progress,
+    ) -> Identification | None:
+        """Returns the fit of the signals of actuators, or None if forces are to be used."""
+        runs = []
+        for sources, what in ((_sources(data), "data"), (_sources(check), "check")):
+            names = [what if len(sources) == 1 else f"{what} {k + 1}" for k in range(len(sources))]
+            requests = [
+                _request(one._source, {**one._options, **reading}, one._given_name)
+                if isinstance(one, Recording)
+                else _request(one, reading, name)
+                for one, name in zip(sources, names)
+            ]
+            runs.append([one.input for one in requests])
+        given = [*unused, *(["instruments"] if has_instruments else [])]
+        found = _answered(progress, lambda hears: _core.identify_signals(self._core, runs, given, hears))
+        return None if found is None else Identification(found, self)
+
+    def _with_gains(self, parameters: Values) -> Model:
+        """Returns the model with the gains of a fit; itself without any."""
+        is_path = isinstance(parameters, (str, os.PathLike)) and os.fspath(parameters) != "nominal"
+        if isinstance(parameters, Identification):
+            has_gains = parameters.signals is not None and bool(parameters.signals.gains)
+        else:
+            has_gains = is_path and self._core.values_of_fit(os.fspath(parameters))[1]  # type: ignore[arg-type]
+        if not has_gains:
+            return self
+        model, _ = _core.with_fit(self._core, *_fit(parameters))  # type: ignore[arg-type]
+        return Model(model)
 
     @with_keywords((READING, ReadingOptions))
     def diagnose(
@@ -1175,8 +1261,8 @@ class Model:
         return Model(self._core.with_effect(kind, places, at is None, lacking, values, names))
 
     def with_fit(self, parameters: Values) -> Model:
-        """Returns the model with other values of its base parameters, such as those of an :class:`Identification`."""
-        return Model(self._core.with_values(self._values(parameters)[0]))
+        """Returns the model with other values of its base parameters, and of gains if they are a fit of signals."""
+        return Model(self._with_gains(parameters)._core.with_values(self._values(parameters)[0]))
 
     def adopt(self, fit: Identification | PathText) -> Model:
         """Returns the model with a fit in its file, instead of nominal values; ``save`` writes the file.

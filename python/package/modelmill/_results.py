@@ -155,6 +155,18 @@ class Page:
 class Comparison(Result):
     """The error of a model along recordings, and where it occurs."""
 
+    def __init__(self, found: _core.Result, forward: _core.Result | None = None) -> None:
+        super().__init__(found)
+        if forward is not None:
+            self._object["forward"] = json.loads(forward.json)
+            self._text += "\n" + forward.text
+
+    @property
+    def forward(self) -> dict[str, Any] | None:
+        """Position errors of the model when it is simulated forward in time; None unless ``forward=True`` was given."""
+        errors: dict[str, Any] | None = self._object.get("forward")
+        return errors
+
     @property
     def nrms(self) -> float | None:
         """``||measured - model|| / ||measured||`` over all drives; None if their units differ."""
@@ -196,6 +208,35 @@ class Parameter:
     nominal: float | None
 
 
+class ServoFit:
+    """What a fit of commands, currents or voltages has besides base parameters.
+
+    Attributes
+    ----------
+    parameters : list of dict
+        Values of the equations with the forces of the actuators, which contain gains: ``expression``, ``value``, ``std``,
+        ``unit``, ``status``, and ``relative_to`` for a value that is only known as a ratio.
+    gains : list of dict
+        Gains of the actuators: ``name``, ``value``, ``std``, ``unit``. Empty if only ratios are known.
+    delays : list of dict
+        Delays in s: ``drive``, ``value``, ``std``, ``interval`` (95 %), and ``known`` for one of the model file.
+    estimator : dict
+        ``kind`` is ``"instruments"`` or ``"least_squares"``.
+    only_ratios : list of dict
+        Groups of parameters of which only ratios are known, with what fixes their scale (``fixed_by``).
+    """
+
+    def __init__(self, found: dict[str, Any]) -> None:
+        self.parameters: list[dict[str, Any]] = found["parameters"]
+        self.gains: list[dict[str, Any]] = (found.get("model_fit") or {}).get("gains", [])
+        self.delays: list[dict[str, Any]] = found["delays"]
+        self.estimator: dict[str, Any] = found["estimator"]
+        self.only_ratios: list[dict[str, Any]] = found["only_ratios"]
+
+    def __repr__(self) -> str:
+        return f"<{len(self.gains)} gains, {len(self.delays)} delays by {self.estimator['kind']}>"
+
+
 class Identification(Result):
     """Base parameters from recordings, with standard deviations and error figures.
 
@@ -211,6 +252,13 @@ class Identification(Result):
         self._model = model
 
     @property
+    def _base(self) -> dict[str, Any]:
+        """The part of the JSON that has the base parameters of the model."""
+        if self.signals is None:
+            return self._object
+        return self._object.get("model_fit") or {"parameters": []}
+
+    @property
     def model(self) -> Model:
         """The model with the identified values instead of those of its file."""
         return self._model.with_fit(self)
@@ -220,7 +268,7 @@ class Identification(Result):
         """The base parameters."""
         return [
             Parameter(one["name"], one["expression"], one["value"], one.get("std"), one["unit"], one.get("nominal"))
-            for one in self._object["parameters"]
+            for one in self._base["parameters"]
         ]
 
     @property
@@ -230,7 +278,9 @@ class Identification(Result):
 
     @property
     def condition_number(self) -> float:
-        """Condition number of the regressor."""
+        """Condition number of the regressor; after scaling its columns to equal norm for a fit of signals."""
+        if self.signals is not None:
+            return float(self._object["scaled_condition_number"] or np.inf)
         return float(self._object["condition_number"])
 
     @property
@@ -244,6 +294,11 @@ class Identification(Result):
     def check(self) -> Figures | None:
         """Error figures on the validation runs, which the fit did not use."""
         return Figures.of(self._object.get("check"))
+
+    @property
+    def signals(self) -> ServoFit | None:
+        """The fit of a log without forces: gains, delays and the estimator; None for a fit of measured forces."""
+        return ServoFit(self._object) if self._object.get("source") == "signals" else None
 
     def to_pandas(self) -> pd.DataFrame:
         """A row for each base parameter."""
@@ -507,3 +562,30 @@ class Excitation(Result):
 
     def _repr_html_(self) -> str:
         return self.picture + text_html(self._text)
+
+
+class Simulation(Result):
+    """A simulated recording; pass ``columns`` as a recording to the methods of a model.
+
+    Attributes
+    ----------
+    columns : dict of str to numpy.ndarray, each of shape (n,)
+        ``t`` (s), the coordinates (rad or m), and the forces of the drives (N or N m); for a model also the rates of the
+        coordinates (with ``_d``).
+    """
+
+    def __init__(self, made: _core.Simulation) -> None:
+        super().__init__(made)
+        self.columns: dict[str, NDArray[np.float64]] = dict(made.columns())
+        self._csv = made.csv
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The columns as a table."""
+        whole = frame([{"t": float(t)} for t in self.columns["t"]])
+        for name, values in self.columns.items():
+            whole[name] = values
+        return whole
+
+    def to_csv(self, path: str | Path) -> None:
+        """Writes the recording as the program does."""
+        Path(path).write_text(self._csv, encoding="utf-8")

@@ -5,47 +5,17 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._errors import ModelmillError
-from ._model import Floats, Model, Progress, _warn, load
+from ._model import Model, Progress, _warn, load
 from ._options import PathText
 from ._progress import told
-from ._results import Excitation, Result, frame
+from ._results import Excitation, Result, Simulation
 from ._tables import columns as columns_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-
-class Simulation(Result):
-    """Sensor readings of a rig along a trajectory; pass ``columns`` as a recording to the methods of a model.
-
-    Attributes
-    ----------
-    columns : dict of str to numpy.ndarray, each of shape (n,)
-        ``t`` (s), the coordinates (rad or m), and the forces of the drives (N or N m).
-    """
-
-    def __init__(self, made: _core.Simulation) -> None:
-        super().__init__(made)
-        self.columns: dict[str, Floats] = dict(made.columns())
-        self._csv = made.csv
-
-    def to_pandas(self) -> pd.DataFrame:
-        """The columns as a table."""
-        whole = frame([{"t": float(t)} for t in self.columns["t"]])
-        for name, values in self.columns.items():
-            whole[name] = values
-        return whole
-
-    def to_csv(self, path: PathText) -> None:
-        """Writes the recording as the program does."""
-        Path(path).write_text(self._csv, encoding="utf-8")
 
 
 class Reduction(Result):
