@@ -246,6 +246,12 @@ impl CoreModel {
         self.model.derivation.mechanism.title.as_deref()
     }
 
+    /// Whether the model file has actuators.
+    #[getter]
+    fn has_actuators(&self) -> bool {
+        !self.model.actuators().is_empty()
+    }
+
     /// Names of the active coordinates.
     #[getter]
     fn coordinates(&self) -> Vec<String> {

@@ -40,33 +40,40 @@ pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -
     let actuators = system.servo.actuators();
     let first_estimates = delays.to_vec();
     refine_by_instruments(system, delays)?;
-    let mut impossible = impossible_drives(system, delays)?;
+    let Some(mut impossible) = impossible_drives(system, delays)? else {
+        return Ok(());
+    };
     for share in DELAY_RESTARTS {
-        if impossible.is_empty() {
+        let of_impossible = |k: &&usize| impossible.contains_key(&actuators[**k].drive.0);
+        let moved: Vec<usize> = estimated.iter().filter(of_impossible).copied().collect();
+        if moved.is_empty() {
             break;
         }
         let mut other = delays.to_vec();
-        for k in estimated
-            .iter()
-            .filter(|k| impossible.contains_key(&actuators[**k].drive.0))
-        {
+        for k in &moved {
             other[*k].value = share * first_estimates[*k].value;
             other[*k].is_open = false;
         }
         let start = other.clone();
-        if !step_to_solution(system, &mut other, &estimated)? {
+        if !step_to_solution(system, &mut other, &estimated).unwrap_or(false) {
             // The equations do not decide between this delay and the first estimate.
             other = start;
-            for (one, first) in other.iter_mut().zip(&first_estimates) {
-                let distance = (first.value - one.value).abs();
-                if distance > 0.0 {
-                    one.std = distance / HALF_INTERVAL;
-                    one.interval = Some([(one.value - distance).max(0.0), one.value + distance]);
-                }
+            for k in &moved {
+                let one = &mut other[*k];
+                let distance = (first_estimates[*k].value - one.value).abs();
+                one.std = distance / HALF_INTERVAL;
+                one.interval = Some([(one.value - distance).max(0.0), one.value + distance]);
             }
         }
-        let others = impossible_drives(system, &other)?;
-        if others.values().sum::<f64>() < impossible.values().sum::<f64>() {
+        let Ok(Some(others)) = impossible_drives(system, &other) else {
+            continue;
+        };
+        // First the number of drives whose delay is at the end of the search, then the signs.
+        let size = |all: &BTreeMap<usize, f64>| {
+            let finite = all.values().filter(|x| x.is_finite());
+            (all.values().filter(|x| x.is_infinite()).count(), finite.sum::<f64>())
+        };
+        if size(&others) < size(&impossible) {
             impossible = others;
             delays.clone_from_slice(&other);
         }
@@ -93,10 +100,14 @@ fn estimated(delays: &[ServoDelay]) -> Vec<usize> {
 }
 
 /// The drives in whose equations estimates are negative that must be positive, with the sum of the squares of these
-/// estimates in standard deviations; infinite for a drive whose delay is at the end of the search.
-fn impossible_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<BTreeMap<usize, f64>> {
+/// estimates in standard deviations; infinite for a drive whose delay is at the end of the search. `None` without
+/// instruments: signs of biased estimates decide nothing.
+fn impossible_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome<Option<BTreeMap<usize, f64>>> {
     let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
     let solved = system.solve(&values)?;
+    if !matches!(solved.estimator, ServoEstimator::Instruments { .. }) {
+        return Ok(None);
+    }
     let body_rows = system.servo.body_rows();
     let width = system.servo.equations.base.len();
     let at_end = delays.iter().zip(system.servo.actuators());
@@ -105,18 +116,19 @@ fn impossible_drives(system: &ServoSystem<'_>, delays: &[ServoDelay]) -> Outcome
     for (k, sigmas) in system.negative_estimates(&solved) {
         let mut squares = vec![0.0; body_rows.len()];
         for (i, row) in solved.equations.regressor.chunks_exact(width).enumerate() {
-            squares[i % body_rows.len()] += row[k] * row[k];
+            let row_of_body = i % body_rows.len();
+            squares[row_of_body] += (solved.weights[row_of_body] * row[k]).powi(2);
         }
         // A parameter belongs to the drive in whose equation it has the largest effect.
         let largest = (0..squares.len()).max_by(|a, b| squares[*a].total_cmp(&squares[*b]));
         *impossible.entry(largest.map_or(0, |row| body_rows[row])).or_insert(0.0) += sigmas * sigmas;
     }
-    Ok(impossible)
+    Ok(Some(impossible))
 }
 
 /// Gauss-Newton steps of some delays, given by place, from their present values. Returns whether they converged.
 fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimated: &[usize]) -> Outcome<bool> {
-    let mut last_step = f64::INFINITY;
+    let (mut last_step, mut is_determined) = (f64::INFINITY, true);
     for _ in 0..DELAY_ITERATIONS {
         let values: Vec<f64> = delays.iter().map(|delay| delay.value).collect();
         let solved = system.solve(&values)?;
@@ -138,9 +150,11 @@ fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimat
         }
         let first = solution.values.len() - estimated.len();
         let mut largest: f64 = 0.0;
+        is_determined = true;
         for (at, k) in estimated.iter().enumerate() {
             let (step, std) = (solution.values[first + at], uncertainty.std[first + at]);
             if !solution.determined[first + at] || !std.is_finite() {
+                is_determined = false;
                 continue;
             }
             let one = &mut delays[*k];
@@ -156,7 +170,7 @@ fn step_to_solution(system: &ServoSystem<'_>, delays: &mut [ServoDelay], estimat
             break;
         }
     }
-    Ok(last_step <= DELAY_STEP)
+    Ok(is_determined && last_step <= DELAY_STEP)
 }
 
 /// The change of all equations by the delays of some actuators.

@@ -2,8 +2,8 @@
 //!
 //! The low-pass of the preparation passes positions, and thus rates, accelerations and signals. The force of dry friction
 //! jumps at a reversal, and the filtered motion contains the filtered jump. So the columns of dry friction pass the same
-//! filter. Without it, estimates of dry friction grow as the cut-off falls: by 16 % at 6 Hz in the arm of six servos of
-//! `lab/servo-plant`. Source: M. Gautier, "Dynamic identification of robots with power model", ICRA 1997 (parallel
+//! filter. Without it, estimates of dry friction grow as the cut-off falls: by 7 to 20 % at 6 Hz in the arm of six servos
+//! of `lab/servo-plant`. Source: M. Gautier, "Dynamic identification of robots with power model", ICRA 1997 (parallel
 //! filtering).
 
 use modelmill_identify::LowPass;
@@ -106,7 +106,7 @@ fn jumping_columns(servo: &ServoModel) -> (Vec<usize>, bool) {
     (columns, is_complete)
 }
 
-/// As [`DirectionColumns::counting_samples`], without samples near a reversal, where a filter mixes both directions.
+/// As [`DirectionColumns::counting_samples`], with the wider distance from a reversal that columns without a filter need.
 ///
 /// Fails when a pose has no solution.
 pub(super) fn samples_between_reversals(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<Vec<Vec<bool>>> {

@@ -157,8 +157,8 @@ impl UsedSamples {
     }
 }
 
-/// A segment with derivatives that are accurate enough for equations whose terms nearly cancel. Recorded ones at uneven
-/// times stay.
+/// A segment with derivatives that are accurate enough for equations whose terms nearly cancel. At uneven times the
+/// derivatives of the preparation stay.
 fn with_accurate_derivatives(segment: &RecordingSegment) -> RecordingSegment {
     let mut accurate = segment.clone();
     let run = &mut accurate.run;

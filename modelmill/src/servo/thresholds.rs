@@ -17,7 +17,7 @@ pub(super) const DELAY_STEPS: usize = 100;
 pub(super) const LARGEST_DELAY: f64 = DELAY_STEPS as f64 * DELAY_STEP;
 /// Largest correction of a delay by forces, s: beyond it a Gauss-Newton step is not accurate. By judgement.
 pub(super) const LARGEST_DELAY_STEP: f64 = 0.02;
-/// Gauss-Newton steps of delays with instruments at most; some three suffice.
+/// Gauss-Newton steps of delays with instruments at most; some three suffice near the solution.
 pub(super) const DELAY_ITERATIONS: usize = 6;
 /// Shares of the first estimates of delays at which the steps begin again. By judgement.
 pub(super) const DELAY_RESTARTS: [f64; 5] = [0.7, 0.45, 0.2, 0.1, 0.0];
@@ -35,8 +35,8 @@ pub(super) const STANDSTILL_SHARE: f64 = 0.02;
 /// Samples nearer to a reversal than this many periods of the filter's cut-off are left out: the filter mixes both
 /// directions of the friction there. By judgement.
 pub(super) const REVERSAL_PERIODS: f64 = 1.0;
-/// As [`REVERSAL_PERIODS`], where the columns of friction pass the same filter: what remains is that friction at a reversal
-/// is no sign. Chosen with MuJoCo's friction, which turns 9 ms early, and encoders of 12 and 18 bits at cut-offs of 6 to
+/// As [`REVERSAL_PERIODS`], where the columns of friction pass the same filter: what remains is that real
+/// friction near a reversal is no step. Chosen with MuJoCo's friction, which turns 9 ms early, and encoders of 12 and 18 bits at cut-offs of 6 to
 /// 20 Hz: with a quarter, dry friction is up to 10 % too small; with one period its deviations are twice as large.
 pub(super) const FILTERED_REVERSAL_PERIODS: f64 = 0.5;
 /// A drive whose rate is below this share of its rms rate for [`STANDING_PERIODS`] stands. By judgement.

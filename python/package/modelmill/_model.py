@@ -1057,6 +1057,8 @@ class Model:
         progress: Progress,
     ) -> Identification | None:
         """Returns the fit of the signals of actuators, or None if forces are to be used."""
+        if not self._core.has_actuators:
+            return None
         runs = []
         for sources, what in ((_sources(data), "data"), (_sources(check), "check")):
             names = [what if len(sources) == 1 else f"{what} {k + 1}" for k in range(len(sources))]
@@ -1066,10 +1068,15 @@ class Model:
                 else _request(one, reading, name)
                 for one, name in zip(sources, names)
             ]
-            runs.append([one.input for one in requests])
+            # Sources, because recordings that were prepared for forces have other derivatives.
+            runs.append([(one.name, one.input[1], one.input[2]) for one in requests if isinstance(one.input, tuple)])
         given = [*unused, *(["instruments"] if has_instruments else [])]
-        found = _answered(progress, lambda hears: _core.identify_signals(self._core, runs, given, hears))
-        return None if found is None else Identification(found, self)
+        with told(progress) as hears:
+            found = _core.identify_signals(self._core, runs, given, hears)
+        if found is None:
+            return None
+        _warn(found.notes, 4)
+        return Identification(found, self)
 
     def _with_gains(self, parameters: Values) -> Model:
         """Returns the model with the gains of a fit; itself without any."""
