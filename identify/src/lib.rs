@@ -64,7 +64,7 @@ pub use figures::{
 pub use motion::{
     DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun, RunRepeatability,
     SmoothedCoordinate, SmoothingMethod, StatePreparation, decimate, decimate_columns, decimate_table, decimate_time,
-    differentiate, differentiate_accurately, filter_and_differentiate,
+    differentiate, differentiate_by_seven_points, filter_and_differentiate, is_even,
 };
 pub use recording::{
     ColumnInfo, ColumnScaling, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError,

@@ -3,11 +3,11 @@
 
 use std::sync::Arc;
 
+use modelmill::Error;
 use modelmill::recording::{PreparedRecording, RecordingOptions};
-use modelmill::servo::ServoModel;
+use modelmill::servo::ServoLogs;
 use modelmill::text::style::TerminalStyle;
 use modelmill::text::table::count;
-use modelmill::{Error, Outcome};
 use pyo3::prelude::*;
 use serde_json::json;
 
@@ -22,8 +22,8 @@ use crate::wording::PythonWording;
 /// Name in messages, source and options of a recording.
 type SourceInput<'py> = (String, PythonSource<'py>, Keywords<RecordingOptions>);
 
-/// Estimates a model with actuators from commands, currents or voltages. None if the model has no actuators, or if the
-/// recordings have forces and lack these signals. `unused` are given keywords without effect on such an estimate.
+/// Estimates a model with actuators from commands, currents or voltages. None if the model has no actuators, or if a
+/// recording has forces and lacks these signals. `unused` are given keywords without effect on such an estimate.
 #[pyfunction]
 pub(crate) fn identify_signals(
     py: Python<'_>,
@@ -33,41 +33,21 @@ pub(crate) fn identify_signals(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Option<PythonResult>> {
     let model: &CoreModel = &model;
-    if model.model.actuators().is_empty() {
-        return Ok(None);
-    }
-    let [fit, check] = runs.map(|run| {
-        let all = run.into_iter();
-        all.map(|(name, source, options)| PassedRecording::new(py, &name, source, &options))
-            .collect::<PyResult<Vec<_>>>()
-    });
-    let (fit, check) = (fit?, check?);
+    let input = |(name, source, options): SourceInput<'_>| PassedRecording::new(py, &name, source, &options);
+    let [fit, check] = runs.map(|run| run.into_iter().map(input).collect::<PyResult<Vec<_>>>());
+    let runs = [fit?, check?];
     let found = model.run_interruptible(py, progress.as_ref(), || {
-        let servo = model.model.servo_model()?;
-        let read = |runs: Vec<PassedRecording>, of: &modelmill::Model| -> Vec<_> {
-            let runs = runs.into_iter();
-            runs.map(|one| one.with_reading(ServoModel::reading).read(of)).collect()
+        let logs = model.model.prepare_servo_logs(|model, change| {
+            let read = |one: &PassedRecording| one.clone().with_reading(change).read(model);
+            runs.each_ref().map(|run| run.iter().map(read).collect())
+        })?;
+        let Some(logs) = logs else {
+            return Ok(None);
         };
-        let own = [fit.clone(), check.clone()].map(|runs| read(runs, &servo.equations));
-        let prepared = (servo.equations).prepare_together(servo.equations.add_actuator_forces(own));
-        let [fitted, checked] = match all_prepared(prepared) {
-            Ok(prepared) => prepared,
-            // Without the signals, forces may do; the first error names the missing signals.
-            Err(error) => {
-                let runs = [read(fit, &model.model), read(check, &model.model)];
-                let forces = all_prepared(model.model.prepare_together(runs));
-                let has_forces = forces.is_ok_and(|[fit, _]| fit.iter().all(PreparedRecording::has_forces));
-                return if has_forces { Ok(None) } else { Err(error) };
-            }
-        };
-        if !unused.is_empty() {
-            return Err(Error::input(format!(
-                "{} cannot be used with actuators: their estimator chooses weights and instruments itself; leave it out",
-                unused.join(", ")
-            )));
+        match ServoLogs::refuse_options(&unused) {
+            Some(says) => Err(Error::input(says)),
+            None => Ok(Some(logs.identify()?)),
         }
-        let [fitted, checked] = [&fitted, &checked].map(|all| all.iter().collect::<Vec<_>>());
-        Ok(Some(servo.identify(&fitted, &checked)?))
     })?;
     let Some(found) = found else {
         return Ok(None);
@@ -80,12 +60,6 @@ pub(crate) fn identify_signals(
     Ok(Some(
         PythonResult::new(&found.json(&PythonWording), &text, remarks(&found.notes)).with_values(values),
     ))
-}
-
-/// All recordings, or the first error.
-fn all_prepared(runs: [Vec<Outcome<PreparedRecording>>; 2]) -> Outcome<[Vec<PreparedRecording>; 2]> {
-    let [fit, check] = runs.map(|run| run.into_iter().collect::<Outcome<Vec<_>>>());
-    Ok([fit?, check?])
 }
 
 /// The model with the values of a fit, which is a text with a name or the path of a file, and with the gains of actuators

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::identify::Instruments;
 use modelmill::recording::{PreparedRecording, RecordingOptions, StandstillRule};
-use modelmill::servo::{ServoIdentification, ServoModel};
+use modelmill::servo::{ServoIdentification, ServoLogs};
 use modelmill::{Host, Model};
 
 use crate::args::IdentifyArgs;
@@ -33,9 +33,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     if standstill != StandstillRule::Automatic {
         reading.standstill = StandstillRule::KeepAll;
     }
-    if !model.actuators().is_empty()
-        && let Some(found) = identify_from_signals(&model, args, &reading)?
-    {
+    if let Some(found) = identify_from_signals(&model, args, &reading)? {
         let object = found.json(&FlagWording);
         if let Some(target) = &target {
             target.write(&format!("{object:#}\n"))?;
@@ -89,35 +87,28 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     Ok(())
 }
 
-/// Estimates a model with actuators from commands, currents or voltages; `None` if the recordings have forces and lack
-/// these signals.
+/// Estimates a model with actuators from commands, currents or voltages; `None` without actuators, or if a recording has
+/// forces and lacks these signals.
 fn identify_from_signals(
     model: &Model,
     args: &IdentifyArgs,
     reading: &RecordingOptions,
 ) -> CommandOutcome<Option<ServoIdentification>> {
-    let servo = model.servo_model()?;
-    let reading = ServoModel::reading(reading);
-    let read = commands::recordings(&servo.equations, [&args.data, &args.check], &reading);
-    let [data, check] = match read {
-        Ok(read) => read,
-        // Without the signals, forces may do; the first error names the missing signals.
-        Err(error) => {
-            let has_forces = commands::recordings(model, [&args.data, &args.check], &reading)
-                .is_ok_and(|[data, _]| data.iter().all(PreparedRecording::has_forces));
-            return if has_forces { Ok(None) } else { Err(error) };
-        }
+    let files = [&args.data, &args.check].map(|paths| paths.iter().map(|path| commands::files_of(path)).collect());
+    let runs = files.each_ref().map(|files: &Vec<_>| commands::runs_of(files));
+    let logs = model.prepare_servo_logs(|model, change| {
+        let reading = change(reading);
+        let read = |paths: &Vec<&Path>| model.read_recording(paths, &reading);
+        runs.each_ref().map(|run| run.iter().map(read).collect())
+    })?;
+    let Some(logs) = logs else {
+        return Ok(None);
     };
     // An option without effect would be taken for one that was applied.
-    let unused = args.estimators.given_flags();
-    if !unused.is_empty() {
-        return Err(CommandFailure::Usage(format!(
-            "{} cannot be used with actuators: their estimator chooses weights and instruments itself; leave it out",
-            unused.join(", ")
-        )));
+    match ServoLogs::refuse_options(&args.estimators.given_flags()) {
+        Some(says) => Err(CommandFailure::Usage(says)),
+        None => Ok(Some(logs.identify()?)),
     }
-    let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
-    Ok(Some(servo.identify(&data, &check)?))
 }
 
 /// The period in s of `--instruments period=SECONDS`; none if the instruments are recordings.

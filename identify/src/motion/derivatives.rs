@@ -6,7 +6,7 @@
 //! are [`crate::StatePreparation::emps`]. The cut-off is chosen by [`crate::motion::cutoff`]. Periodic motions are
 //! better treated by [`crate::motion::series`].
 
-use crate::motion::even::{SampleSpacing, sample_spacing};
+use crate::motion::even::is_even;
 use crate::signal::{FilterError, LowPass};
 
 /// The derivative of `values` at each time, from the parabola through three neighbours. This is the central
@@ -37,16 +37,16 @@ pub fn differentiate(time: &[f64], values: &[f64]) -> Vec<f64> {
     derivative
 }
 
-/// Rates and accelerations of smooth positions at even times, from polynomials of degree six through seven neighbours, of
-/// order `h^6` in the step `h`; `None` for uneven times or fewer than seven samples. Three samples at both ends have central
+/// Rates and accelerations of one coordinate, whose positions are smooth and at even times: derivatives of polynomials of
+/// degree six through seven neighbours, of order `h^6` in the step `h`; `None` for uneven times or fewer than seven samples. Three samples at both ends have central
 /// differences or one-sided ones, see [`differentiate`].
 ///
 /// Central differences make rates too small by `(w h)^2/6` at an angular frequency `w`. Where terms nearly cancel, as in
 /// the equations of a servo that follows its command, this is no small error. Panics unless `positions` is as long as `time`.
 /// Source: B. Fornberg, "Generation of finite difference formulas on arbitrarily spaced grids", Math. Comp. 51 (1988).
-pub fn differentiate_accurately(time: &[f64], positions: &[f64]) -> Option<[Vec<f64>; 2]> {
+pub fn differentiate_by_seven_points(time: &[f64], positions: &[f64]) -> Option<[Vec<f64>; 2]> {
     let n = time.len();
-    if n < 7 || sample_spacing(time) == SampleSpacing::Uneven {
+    if n < 7 || !is_even(time) {
         return None;
     }
     let mut rates = differentiate(time, positions);
@@ -106,7 +106,7 @@ mod tests {
         let time: Vec<f64> = (0..200).map(|k| f64::from(k) * 0.005).collect();
         let (w, phase) = (13.0, 0.3);
         let positions: Vec<f64> = time.iter().map(|t| (w * t + phase).sin()).collect();
-        let [rates, accelerations] = differentiate_accurately(&time, &positions).unwrap();
+        let [rates, accelerations] = differentiate_by_seven_points(&time, &positions).unwrap();
         let central = differentiate(&time, &positions);
         for i in 3..time.len() - 3 {
             let (sine, cosine) = (w * time[i] + phase).sin_cos();
@@ -115,7 +115,7 @@ mod tests {
             let share = (central[i] - w * cosine).abs() / (w * cosine).abs();
             assert!((share / ((w * 0.005_f64).powi(2) / 6.0) - 1.0).abs() < 0.01);
         }
-        assert!(differentiate_accurately(&[0.0, 0.1, 0.35, 0.4, 0.7, 1.3, 1.4], &positions[..7]).is_none());
+        assert!(differentiate_by_seven_points(&[0.0, 0.1, 0.35, 0.4, 0.7, 1.3, 1.4], &positions[..7]).is_none());
     }
 
     #[test]

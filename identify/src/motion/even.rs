@@ -38,7 +38,7 @@ pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
 }
 
 /// Whether the steps are even, except for rounding.
-pub(crate) fn is_even(time: &[f64]) -> bool {
+pub fn is_even(time: &[f64]) -> bool {
     sample_spacing(time) != SampleSpacing::Uneven
 }
 

@@ -24,8 +24,9 @@ mod thresholds;
 
 pub use decimation::{DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time};
 pub(crate) use derivatives::mean_rate;
-pub use derivatives::{SmoothedCoordinate, differentiate, differentiate_accurately, filter_and_differentiate};
-pub(crate) use even::{is_even, resample_evenly};
+pub use derivatives::{SmoothedCoordinate, differentiate, differentiate_by_seven_points, filter_and_differentiate};
+pub use even::is_even;
+pub(crate) use even::resample_evenly;
 pub use options::{DerivativeSource, SmoothingMethod, StatePreparation};
 pub use periods::RunRepeatability;
 pub use prepare::PreparationChoices;

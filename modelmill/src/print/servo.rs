@@ -119,6 +119,7 @@ impl ServoIdentification {
                 "std": delay.std,
                 "interval": delay.interval,
                 "known": delay.interval.is_none(),
+                "determined": !delay.is_open,
             })
         });
         let check = (!self.check.is_empty()).then(|| errors(&self.check));

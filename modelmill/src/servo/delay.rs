@@ -25,7 +25,8 @@ pub struct ServoDelay {
     pub interval: Option<[f64; 2]>,
     /// Standard deviation, s; zero if the file gives the delay.
     pub std: f64,
-    /// Whether the best delay is at an end of the search range, or any delay in it is possible.
+    /// Whether the recording does not determine it: the best is at an end of the search range, or several satisfy the
+    /// equations.
     pub is_open: bool,
 }
 
@@ -115,13 +116,12 @@ fn residuals(
             let place = body_rows.iter().position(|d| *d == actuator.drive.0).unwrap_or(0);
             let response = response_column(servo, actuator.drive.0);
             let mut table: Vec<Vec<f64>> = Vec::new();
-            for (one, rates) in equations.iter().zip(&rates) {
+            for ((one, rates), used) in equations.iter().zip(&rates).zip(samples) {
+                let rates = rates.get(actuator.drive.0);
+                let direction = rates.map(|rates| used.filtered_direction(rates)).unwrap_or_default();
                 let rows = one.regressor.chunks_exact(n).skip(place).step_by(body_rows.len());
                 for (sample, row) in rows.enumerate().filter(|(_, row)| row.iter().any(|x| *x != 0.0)) {
-                    let friction = rates.get(actuator.drive.0).map(|rates| {
-                        let rate = rates[sample];
-                        [rate, if rate == 0.0 { 0.0 } else { rate.signum() }, 1.0]
-                    });
+                    let friction = rates.map(|rates| [rates[sample], direction[sample], 1.0]);
                     table.push(row.iter().copied().chain(friction.into_iter().flatten()).collect());
                 }
             }

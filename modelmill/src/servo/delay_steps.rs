@@ -43,6 +43,7 @@ pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -
     let Some(mut impossible) = impossible_drives(system, delays)? else {
         return Ok(());
     };
+    let mut undecided = Vec::new();
     for share in DELAY_RESTARTS {
         let of_impossible = |k: &&usize| impossible.contains_key(&actuators[**k].drive.0);
         let moved: Vec<usize> = estimated.iter().filter(of_impossible).copied().collect();
@@ -55,7 +56,8 @@ pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -
             other[*k].is_open = false;
         }
         let start = other.clone();
-        if !step_to_solution(system, &mut other, &estimated).unwrap_or(false) {
+        let has_converged = step_to_solution(system, &mut other, &estimated).unwrap_or(false);
+        if !has_converged {
             // The equations do not decide between this delay and the first estimate.
             other = start;
             for k in &moved {
@@ -76,7 +78,11 @@ pub(super) fn find_delays(system: &ServoSystem<'_>, delays: &mut [ServoDelay]) -
         if size(&others) < size(&impossible) {
             impossible = others;
             delays.clone_from_slice(&other);
+            undecided = if has_converged { Vec::new() } else { moved };
         }
+    }
+    for k in undecided {
+        delays[k].is_open = true;
     }
     Ok(())
 }

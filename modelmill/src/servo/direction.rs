@@ -6,12 +6,13 @@
 //! of `lab/servo-plant`. Source: M. Gautier, "Dynamic identification of robots with power model", ICRA 1997 (parallel
 //! filtering).
 
-use modelmill_identify::LowPass;
+use modelmill_identify::{LowPass, is_even};
 use modelmill_spec::{EffectTerm, ExactExpression, ExactFunction};
 
 use super::ServoModel;
 use super::thresholds::{
-    FILTERED_REVERSAL_PERIODS, REVERSAL_PERIODS, STANDING_PERIODS, STANDING_SHARE, STANDSTILL_SHARE, TRANSIENT_PERIODS,
+    FILTERED_REVERSAL_PERIODS, REVERSAL_PERIODS, SAMPLES_PER_PERIOD, STANDING_PERIODS, STANDING_SHARE,
+    STANDSTILL_SHARE, TRANSIENT_PERIODS,
 };
 use crate::along;
 use crate::error::Outcome;
@@ -21,6 +22,8 @@ use crate::segment::RecordingSegment;
 pub(super) struct DirectionColumns {
     /// Positions of the base parameters.
     columns: Vec<usize>,
+    /// Whether any effect depends on the direction of a motion.
+    has_jumps: bool,
     /// The filter of the preparation; `None` without such columns, or if it cannot be applied.
     low_pass: Option<LowPass>,
     /// Period of the cut-off of the preparation, s; zero without a filter.
@@ -30,12 +33,14 @@ pub(super) struct DirectionColumns {
 impl DirectionColumns {
     /// Those of a model along a segment.
     pub(super) fn new(servo: &ServoModel, segment: &RecordingSegment) -> Self {
-        let (columns, is_complete) = jumping_columns(servo);
+        let jumping = jumping_terms(servo);
+        let (columns, is_complete) = jumping_columns(servo, &jumping);
         let low_pass = (is_complete && !columns.is_empty())
             .then(|| filter_of(segment))
             .flatten();
         Self {
             period: segment.run.prepared.cutoff_hz.map_or(0.0, f64::recip),
+            has_jumps: !jumping.is_empty(),
             columns,
             low_pass,
         }
@@ -66,32 +71,70 @@ impl DirectionColumns {
         low_pass.zero_phase(&series).unwrap_or(series)
     }
 
-    /// Which equations count, `[row of a body][sample]`: forces that were measured, and drives whose friction has a known
-    /// direction.
+    /// Which samples of a segment are used: forces that were measured, and drives whose friction has a known direction.
     ///
     /// Fails when a pose has no solution.
-    pub(super) fn counting_samples(&self, servo: &ServoModel, segment: &RecordingSegment) -> Outcome<Vec<Vec<bool>>> {
-        if self.low_pass.is_some() {
-            let transient = TRANSIENT_PERIODS * self.period;
-            let time = &segment.run.time;
-            let (first, last) = (time[0] + transient, time[time.len() - 1] - transient);
-            select_samples(servo, segment, |rates| {
-                let standing = standing_samples(time, rates, self.period);
-                let moving = moving_samples(time, rates, FILTERED_REVERSAL_PERIODS * self.period);
-                let is_known = |i: usize| moving[i] && !standing[i] && (first..=last).contains(&time[i]);
-                (0..rates.len()).map(is_known).collect()
-            })
+    pub(super) fn choose_samples(&self, servo: &ServoModel, segment: &RecordingSegment) -> Outcome<SampleChoice> {
+        let rates = along::drive_rates(&servo.equations, segment)?;
+        let body_rows = servo.body_rows();
+        let measured = |d: usize, chosen: Vec<bool>| -> Vec<bool> {
+            let chosen = chosen.into_iter().enumerate();
+            chosen
+                .map(|(sample, counts)| counts && segment.run.is_force_measured(d, sample))
+                .collect()
+        };
+        let of_drive = |d: &usize| measured(*d, self.between_reversals(&segment.run.time, &rates[*d]));
+        let between_reversals: Vec<Vec<bool>> = body_rows.iter().map(of_drive).collect();
+        let counts = if self.low_pass.is_some() {
+            let of_drive = |d: &usize| measured(*d, self.with_known_direction(&segment.run.time, &rates[*d]));
+            body_rows.iter().map(of_drive).collect()
         } else {
-            samples_between_reversals(servo, segment)
+            between_reversals.clone()
+        };
+        Ok(SampleChoice {
+            counts,
+            between_reversals,
+        })
+    }
+
+    /// At which samples the filtered columns of friction are known.
+    fn with_known_direction(&self, time: &[f64], rates: &[f64]) -> Vec<bool> {
+        let transient = TRANSIENT_PERIODS * self.period;
+        let (first, last) = (time[0] + transient, time[time.len() - 1] - transient);
+        let standing = standing_samples(time, rates, self.period);
+        let moving = moving_samples(time, rates, FILTERED_REVERSAL_PERIODS * self.period);
+        let is_known = |i: usize| moving[i] && !standing[i] && (first..=last).contains(&time[i]);
+        (0..rates.len()).map(is_known).collect()
+    }
+
+    /// At which samples the filter of the motion mixes no two directions; all without dry friction.
+    fn between_reversals(&self, time: &[f64], rates: &[f64]) -> Vec<bool> {
+        if self.has_jumps {
+            moving_samples(time, rates, REVERSAL_PERIODS * self.period)
+        } else {
+            vec![true; rates.len()]
         }
     }
 }
 
-/// The base parameters whose columns jump at a reversal, and whether these are all that jumps.
-fn jumping_columns(servo: &ServoModel) -> (Vec<usize>, bool) {
+/// The samples of a segment that are used, each `[row of a body][sample]`.
+pub(super) struct SampleChoice {
+    /// The equations that count in a fit.
+    pub(super) counts: Vec<Vec<bool>>,
+    /// Those that are a whole period of the filter's cut-off from a reversal, where even a friction that is no step has a
+    /// known force.
+    pub(super) between_reversals: Vec<Vec<bool>>,
+}
+
+/// The terms of effects that jump with the sign of a quantity.
+fn jumping_terms(servo: &ServoModel) -> Vec<&EffectTerm> {
     let effects = servo.mechanism().effects.iter();
     let terms = effects.flat_map(|effect| &effect.terms);
-    let jumping: Vec<&EffectTerm> = terms.filter(|term| has_sign(&term.expression)).collect();
+    terms.filter(|term| has_sign(&term.expression)).collect()
+}
+
+/// The base parameters whose columns jump at a reversal, and whether these are all that jumps.
+fn jumping_columns(servo: &ServoModel, jumping: &[&EffectTerm]) -> (Vec<usize>, bool) {
     let reduction = &servo.equations.derivation.reduction;
     let contains = |k: usize, term: &EffectTerm| {
         let product = &reduction.products[reduction.retained[k]].0;
@@ -106,49 +149,18 @@ fn jumping_columns(servo: &ServoModel) -> (Vec<usize>, bool) {
     (columns, is_complete)
 }
 
-/// As [`DirectionColumns::counting_samples`], with the wider distance from a reversal that columns without a filter need.
-///
-/// Fails when a pose has no solution.
-pub(super) fn samples_between_reversals(servo: &ServoModel, segment: &RecordingSegment) -> Outcome<Vec<Vec<bool>>> {
-    let mut terms = servo.mechanism().effects.iter().flat_map(|effect| &effect.terms);
-    let has_direction = terms.any(|term| has_sign(&term.expression));
-    select_samples(servo, segment, |rates| {
-        if has_direction {
-            let period = segment.run.prepared.cutoff_hz.map_or(0.0, f64::recip);
-            moving_samples(&segment.run.time, rates, REVERSAL_PERIODS * period)
-        } else {
-            vec![true; rates.len()]
-        }
-    })
-}
-
-/// The samples with a measured force that a choice by the rates of the drive selects, `[row of a body][sample]`.
-fn select_samples(
-    servo: &ServoModel,
-    segment: &RecordingSegment,
-    choose: impl Fn(&[f64]) -> Vec<bool>,
-) -> Outcome<Vec<Vec<bool>>> {
-    let rates = along::drive_rates(&servo.equations, segment)?;
-    let of_drive = |d: usize| {
-        let chosen = choose(&rates[d]).into_iter().enumerate();
-        chosen
-            .map(|(sample, counts)| counts && segment.run.is_force_measured(d, sample))
-            .collect()
-    };
-    Ok(servo.body_rows().into_iter().map(of_drive).collect())
-}
-
 /// The low-pass that smoothed the motion, for columns with the times of the segment; `None` if the motion was smoothed by
-/// another filter, or if the times are too sparse or too few for it.
+/// another filter, or if the times are uneven, or too sparse or too few for it.
 fn filter_of(segment: &RecordingSegment) -> Option<LowPass> {
     let run = &segment.run;
     let (time, cutoff, order) = (&run.time, run.prepared.cutoff_hz?, run.prepared.butterworth_order?);
     let [first, .., last] = time.as_slice() else {
         return None;
     };
-    let low_pass = LowPass::butterworth(order, cutoff, (time.len() - 1) as f64 / (last - first)).ok()?;
+    let rate = (time.len() - 1) as f64 / (last - first);
+    let low_pass = LowPass::butterworth(order, cutoff, rate).ok()?;
     let is_long = (last - first) * cutoff > 4.0 * TRANSIENT_PERIODS && time.len() > low_pass.padding();
-    is_long.then_some(low_pass)
+    (is_long && is_even(time) && rate >= SAMPLES_PER_PERIOD * cutoff).then_some(low_pass)
 }
 
 /// At which samples a drive moves in one direction: its rate is no standstill, and no reversal is nearer than `width`, s.

@@ -22,8 +22,8 @@ use super::instruments::{commanded_segment, project_on_instruments};
 use super::rows::{EquationRows, UsedSamples};
 use super::scale::ServoScale;
 use super::thresholds::{
-    DELAY_SAMPLES, DELAY_SAMPLES_PER_PERIOD, IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR,
-    MOST_SAMPLES, SATURATION_PASSES,
+    DELAY_SAMPLES, IMPOSSIBLE_SIGMAS, INSTRUMENT_CORRELATION, LARGE_BALANCE_ERROR, MOST_SAMPLES, SAMPLES_PER_PERIOD,
+    SATURATION_PASSES,
 };
 use super::turns::turn_sentence;
 use crate::error::{Error, Outcome};
@@ -260,6 +260,7 @@ impl<'a> ServoSystem<'a> {
         let mut own = EquationRows {
             regressor: Vec::new(),
             measured: Vec::new(),
+            is_judged: Vec::new(),
         };
         let mut instruments = Some(own.clone());
         for one in &self.samples {
@@ -296,6 +297,7 @@ impl<'a> ServoSystem<'a> {
         let mut own = EquationRows {
             regressor: Vec::new(),
             measured: Vec::new(),
+            is_judged: Vec::new(),
         };
         for one in &self.samples {
             own.append(one.equations(self.servo, &one.delayed(self.servo, delays))?);
@@ -554,9 +556,10 @@ impl<'a> ServoSystem<'a> {
                     .regressor
                     .chunks_exact(n)
                     .zip(&rows.measured)
+                    .zip(&rows.is_judged)
                     .skip(place)
                     .step_by(body_rows.len());
-                for (row, y) in own.filter(|(row, y)| **y != 0.0 || row.iter().any(|x| *x != 0.0)) {
+                for ((row, y), _) in own.filter(|(_, is_judged)| **is_judged) {
                     let total: f64 = row.iter().zip(base).map(|(x, p)| x * p).sum();
                     let actuated: f64 = gains.iter().map(|k| row[*k] * base[*k]).sum();
                     error += (y - total).powi(2);
@@ -605,7 +608,7 @@ impl<'a> ServoSystem<'a> {
 /// Number of samples with which delays are searched: enough for the filter of the motion.
 fn delay_samples(segments: &[RecordingSegment]) -> usize {
     let of = |segment: &RecordingSegment| match (segment.run.time.as_slice(), segment.run.prepared.cutoff_hz) {
-        ([first, .., last], Some(cutoff)) => float_to_count(DELAY_SAMPLES_PER_PERIOD * cutoff * (last - first)),
+        ([first, .., last], Some(cutoff)) => float_to_count(SAMPLES_PER_PERIOD * cutoff * (last - first)),
         _ => 0,
     };
     segments.iter().map(of).sum::<usize>().max(DELAY_SAMPLES)
@@ -616,6 +619,7 @@ impl EquationRows {
     fn append(&mut self, other: Self) {
         self.regressor.extend(other.regressor);
         self.measured.extend(other.measured);
+        self.is_judged.extend(other.is_judged);
     }
 }
 
@@ -678,9 +682,11 @@ fn remarks(system: &ServoSystem<'_>, solved: &ServoSolution, delays: &[ServoDela
     }
     for delay in delays.iter().filter(|delay| delay.is_open) {
         notes.push(RecordingNote::warning(message!(
-            "The delay of {} is not determined below {} ms; give it as `delay` of the actuator, or record a faster motion.",
+            "The recording does not determine the delay of {}: {} to {} ms are possible; give it as `delay` of the actuator, or \
+             record a faster motion.",
             delay.drive,
-            number(1e3 * super::thresholds::LARGEST_DELAY)
+            number(1e3 * delay.interval.map_or(0.0, |[from, _]| from)),
+            number(1e3 * delay.interval.map_or(delay.value, |[_, to]| to))
         )));
     }
     notes

@@ -18,6 +18,7 @@ use modelmill_spec::{DriveKind, ModelActuator, ModelSymbol, PlaceQuantity};
 use super::ServoModel;
 use super::delay::{DelayQuery, ServoDelay, delays};
 use super::gains::{GainValues, delay_phrase};
+use super::logs::ReadRuns;
 use super::refine::refine_delays;
 use super::suspects::{ServoLimit, servo_limits};
 use super::thresholds::{CERTAIN_LIMIT_SHARE, DELAY_STEP, FEWEST_DECIMATED};
@@ -34,9 +35,6 @@ use crate::text::table::significant;
 
 /// Rounds in which limits and delays of servos are estimated in turn.
 const LIMIT_ROUNDS: usize = 4;
-
-/// Recordings of a fit, and those of its validation, each with its own result.
-type ReadRuns = [Vec<Outcome<UnpreparedRecording>>; 2];
 
 impl Model {
     /// As [`Model::prepare_recordings`], for recordings that may lack forces if the model has actuators: forces of the

@@ -15,6 +15,7 @@ mod estimate;
 mod forces;
 mod gains;
 mod instruments;
+mod logs;
 mod model_fit;
 mod refine;
 mod rows;
@@ -31,6 +32,7 @@ use crate::recording::{DerivativeSource, RecordingOptions, SmoothingMethod, Stan
 
 pub use delay::ServoDelay;
 pub use estimate::{ServoEstimator, ServoIdentification, ServoParameter, ServoRowError, ServoStatus};
+pub use logs::{ReadingChange, ServoLogs};
 pub use scale::{ScaleFreedom, ServoScale};
 
 /// A model with its actuators in place of measured forces.

@@ -1,7 +1,7 @@
 //! Equations of a servo log: rows of the regressor along a segment with delayed signals, and the samples that count.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::differentiate_accurately;
+use modelmill_identify::differentiate_by_seven_points;
 use modelmill_spec::ModelActuator;
 
 use super::ServoModel;
@@ -21,6 +21,8 @@ pub(super) struct EquationRows {
     pub(super) regressor: Vec<f64>,
     /// Measured forces, `[sample][row]`; zero for drives with actuators.
     pub(super) measured: Vec<f64>,
+    /// Whether the error of an equation is judged, `[sample][row]`: only away from reversals.
+    pub(super) is_judged: Vec<bool>,
 }
 
 /// The samples of a segment that are used, with the equations that count there.
@@ -29,6 +31,8 @@ pub(super) struct UsedSamples {
     pub(super) segment: RecordingSegment,
     /// `counts[row][sample]`, by position among the rows of bodies.
     pub(super) counts: Vec<Vec<bool>>,
+    /// Which samples are away from reversals, indexed as `counts`.
+    pub(super) between_reversals: Vec<Vec<bool>>,
     /// The columns that jump at a reversal.
     direction: DirectionColumns,
     /// The complete segment, from which delayed signals are taken.
@@ -50,11 +54,12 @@ impl UsedSamples {
         let places: Vec<usize> = (first..time.len()).step_by(every).collect();
         let segment = pick(&complete, &places);
         let direction = DirectionColumns::new(servo, &segment);
-        let counts = direction.counting_samples(servo, &segment)?;
+        let chosen = direction.choose_samples(servo, &segment)?;
         let [positions, _] = along::drive_motion(&servo.equations, &segment)?;
         Ok(Self {
             segment,
-            counts,
+            counts: chosen.counts,
+            between_reversals: chosen.between_reversals,
             direction,
             complete,
             positions,
@@ -121,6 +126,12 @@ impl UsedSamples {
         }
     }
 
+    /// The direction of a motion at the used samples, filtered as the columns of friction are; `rates` in rad/s or m/s.
+    pub(super) fn filtered_direction(&self, rates: &[f64]) -> Vec<f64> {
+        let direction = rates.iter().map(|rate| if *rate == 0.0 { 0.0 } else { rate.signum() });
+        self.direction.filter_series(direction.collect())
+    }
+
     /// The equations along a segment with the same samples.
     ///
     /// Fails when a pose has no solution.
@@ -134,7 +145,7 @@ impl UsedSamples {
             .map_err(|fault| segment.pose_error(model, fault, 0))?;
         let force = segment.run.force.as_deref().unwrap_or(&[]);
         let body_rows = servo.body_rows();
-        let (mut regressor, mut measured) = (Vec::new(), Vec::new());
+        let (mut regressor, mut measured, mut is_judged) = (Vec::new(), Vec::new(), Vec::new());
         for sample in 0..segment.samples() {
             for d in &body_rows {
                 regressor.extend(all.row(sample * n_drives + d).iter());
@@ -147,13 +158,19 @@ impl UsedSamples {
             .collect();
         let rows = (0..segment.samples()).flat_map(|sample| (0..body_rows.len()).map(move |row| (sample, row)));
         for ((sample, row), columns) in rows.zip(regressor.chunks_exact_mut(model.base.len())) {
-            let weight = f64::from(u8::from(self.counts[row][sample]));
+            let counts = self.counts[row][sample];
+            is_judged.push(counts && self.between_reversals[row][sample]);
+            let weight = f64::from(u8::from(counts));
             for x in columns {
                 *x *= weight;
             }
             measured.push(weight * forces[row].as_ref().map_or(0.0, |force| force[sample]));
         }
-        Ok(EquationRows { regressor, measured })
+        Ok(EquationRows {
+            regressor,
+            measured,
+            is_judged,
+        })
     }
 }
 
@@ -163,7 +180,7 @@ fn with_accurate_derivatives(segment: &RecordingSegment) -> RecordingSegment {
     let mut accurate = segment.clone();
     let run = &mut accurate.run;
     for (q, (qd, qdd)) in run.q.iter().zip(run.qd.iter_mut().zip(&mut run.qdd)) {
-        if let Some([rates, accelerations]) = differentiate_accurately(&run.time, q) {
+        if let Some([rates, accelerations]) = differentiate_by_seven_points(&run.time, q) {
             (*qd, *qdd) = (rates, accelerations);
         }
     }

@@ -12,7 +12,6 @@ use modelmill_identify::estimate::LeastSquares;
 use modelmill_spec::ModelActuator;
 
 use super::ServoModel;
-use super::direction::samples_between_reversals;
 use super::forces::ActuatorStates;
 use super::gains::GainValues;
 use super::rows::UsedSamples;
@@ -157,7 +156,7 @@ impl DriveEquations {
             let used = UsedSamples::new(servo, segment, DELAY_SAMPLES / segments.len().max(1))?;
             let delayed = used.delayed(servo, delays);
             let own = without_signals(model, &delayed);
-            let counts = &samples_between_reversals(servo, &used.segment)?[row];
+            let counts = &used.between_reversals[row];
             let states = own.states(0, own.samples());
             let regressor = ModelEvaluator::new(&model.derivation)
                 .regressor(&states)

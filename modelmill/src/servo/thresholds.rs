@@ -23,8 +23,6 @@ pub(super) const DELAY_ITERATIONS: usize = 6;
 pub(super) const DELAY_RESTARTS: [f64; 5] = [0.7, 0.45, 0.2, 0.1, 0.0];
 /// Change of a delay, s, below which it is known. By judgement: a hundredth of a sample at 1 kHz.
 pub(super) const DELAY_TOLERANCE: f64 = 1e-5;
-/// Samples for each period of the filter's cut-off that a search for delays needs at least. By judgement.
-pub(super) const DELAY_SAMPLES_PER_PERIOD: f64 = 6.0;
 /// Most samples for the search of a delay. By judgement.
 pub(super) const DELAY_SAMPLES: usize = 4000;
 /// Fall of the log likelihood, times two, at the ends of an interval of 95 % of one parameter.
@@ -43,6 +41,9 @@ pub(super) const FILTERED_REVERSAL_PERIODS: f64 = 0.5;
 pub(super) const STANDING_SHARE: f64 = 0.05;
 /// Periods of the filter's cut-off: in less, a filtered rate passes zero without a standstill. By judgement.
 pub(super) const STANDING_PERIODS: f64 = 0.5;
+/// Samples for each period of the filter's cut-off that filtered columns need at least; with fewer, their jumps appear as
+/// other frequencies. By judgement: with 5, the values of the arm in `recordings/servo-arm` are within 0.5 %.
+pub(super) const SAMPLES_PER_PERIOD: f64 = 4.0;
 /// Periods of the filter's cut-off at both ends of a recording in which filtered columns have transients. By judgement:
 /// transients fall tenfold in each period.
 pub(super) const TRANSIENT_PERIODS: f64 = 2.0;
@@ -59,7 +60,7 @@ pub(super) const PROJECTION_RIDGE: f64 = 1e-12;
 /// A value of an impossible sign is reported if it is this many standard deviations beyond zero. By judgement.
 pub(super) const IMPOSSIBLE_SIGMAS: f64 = 3.0;
 /// A balance error above this share of the force of a drive (1) is reported. By judgement: the EMPS axis has 0.044 on
-/// the fitted recording and 0.090 on another one.
+/// the fitted recording and 0.089 on another one.
 pub(super) const LARGE_BALANCE_ERROR: f64 = 0.1;
 /// Most samples of the estimate; more are thinned evenly. By judgement.
 pub(super) const MOST_SAMPLES: usize = 40_000;

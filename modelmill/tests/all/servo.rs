@@ -978,7 +978,6 @@ screw_voltage = "u_V"
     }
     for row in found.fit.iter().chain(&found.check) {
         println!("{row:?}");
-        // Samples up to half a period of the filter's cut-off from a reversal count.
-        assert!(row.error < 0.092 * row.force, "{row:?}");
+        assert!(row.error < 0.09 * row.force, "{row:?}");
     }
 }

@@ -516,6 +516,12 @@ class Model:
             _warn(self._core.nominal_notes, 5)
             return self._core.nominal, "nominal"
         if isinstance(parameters, Identification):
+            if parameters.signals is not None and parameters.signals.only_ratios:
+                fixing = {name for group in parameters.signals.only_ratios for name in group.get("fixed_by", [])}
+                raise ModelmillError(
+                    "the fit contains only ratios, so that the model has no values from it; give a number for one of "
+                    f"{', '.join(sorted(fixing)) or 'its gains'} in the model file, and identify it again"
+                )
             of_fit = [(one.name, one.expression) for one in parameters.parameters]
             own = list(zip(self.p_min.names, self.p_min.expressions))
             if of_fit != own:

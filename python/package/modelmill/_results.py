@@ -219,7 +219,8 @@ class ServoFit:
     gains : list of dict
         Gains of the actuators: ``name``, ``value``, ``std``, ``unit``. Empty if only ratios are known.
     delays : list of dict
-        Delays in s: ``drive``, ``value``, ``std``, ``interval`` (95 %), and ``known`` for one of the model file.
+        Delays in s: ``drive``, ``value``, ``std``, ``interval`` (95 %), ``known`` for one of the model file, and
+        ``determined``, which is False if several delays satisfy the equations.
     estimator : dict
         ``kind`` is ``"instruments"`` or ``"least_squares"``.
     only_ratios : list of dict
