@@ -260,7 +260,6 @@ impl<'a> ServoSystem<'a> {
         let mut own = EquationRows {
             regressor: Vec::new(),
             measured: Vec::new(),
-            is_judged: Vec::new(),
         };
         let mut instruments = Some(own.clone());
         for one in &self.samples {
@@ -297,7 +296,6 @@ impl<'a> ServoSystem<'a> {
         let mut own = EquationRows {
             regressor: Vec::new(),
             measured: Vec::new(),
-            is_judged: Vec::new(),
         };
         for one in &self.samples {
             own.append(one.equations(self.servo, &one.delayed(self.servo, delays))?);
@@ -556,10 +554,9 @@ impl<'a> ServoSystem<'a> {
                     .regressor
                     .chunks_exact(n)
                     .zip(&rows.measured)
-                    .zip(&rows.is_judged)
                     .skip(place)
                     .step_by(body_rows.len());
-                for ((row, y), _) in own.filter(|(_, is_judged)| **is_judged) {
+                for (row, y) in own.filter(|(row, y)| **y != 0.0 || row.iter().any(|x| *x != 0.0)) {
                     let total: f64 = row.iter().zip(base).map(|(x, p)| x * p).sum();
                     let actuated: f64 = gains.iter().map(|k| row[*k] * base[*k]).sum();
                     error += (y - total).powi(2);
@@ -619,7 +616,6 @@ impl EquationRows {
     fn append(&mut self, other: Self) {
         self.regressor.extend(other.regressor);
         self.measured.extend(other.measured);
-        self.is_judged.extend(other.is_judged);
     }
 }
 

@@ -21,8 +21,6 @@ pub(super) struct EquationRows {
     pub(super) regressor: Vec<f64>,
     /// Measured forces, `[sample][row]`; zero for drives with actuators.
     pub(super) measured: Vec<f64>,
-    /// Whether the error of an equation is judged, `[sample][row]`: only away from reversals.
-    pub(super) is_judged: Vec<bool>,
 }
 
 /// The samples of a segment that are used, with the equations that count there.
@@ -46,7 +44,12 @@ impl UsedSamples {
     ///
     /// Fails when a pose has no solution.
     pub(super) fn new(servo: &ServoModel, complete: &RecordingSegment, most: usize) -> Outcome<Self> {
-        let complete = with_accurate_derivatives(complete);
+        let is_commanded = servo.actuators().iter().any(|actuator| actuator.kind.is_commanded());
+        let complete = if is_commanded {
+            with_accurate_derivatives(complete)
+        } else {
+            complete.clone()
+        };
         let time = &complete.run.time;
         let start = time.first().copied().unwrap_or(0.0) + LARGEST_DELAY;
         let first = time.partition_point(|t| *t < start);
@@ -145,7 +148,7 @@ impl UsedSamples {
             .map_err(|fault| segment.pose_error(model, fault, 0))?;
         let force = segment.run.force.as_deref().unwrap_or(&[]);
         let body_rows = servo.body_rows();
-        let (mut regressor, mut measured, mut is_judged) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut regressor, mut measured) = (Vec::new(), Vec::new());
         for sample in 0..segment.samples() {
             for d in &body_rows {
                 regressor.extend(all.row(sample * n_drives + d).iter());
@@ -158,24 +161,19 @@ impl UsedSamples {
             .collect();
         let rows = (0..segment.samples()).flat_map(|sample| (0..body_rows.len()).map(move |row| (sample, row)));
         for ((sample, row), columns) in rows.zip(regressor.chunks_exact_mut(model.base.len())) {
-            let counts = self.counts[row][sample];
-            is_judged.push(counts && self.between_reversals[row][sample]);
-            let weight = f64::from(u8::from(counts));
+            let weight = f64::from(u8::from(self.counts[row][sample]));
             for x in columns {
                 *x *= weight;
             }
             measured.push(weight * forces[row].as_ref().map_or(0.0, |force| force[sample]));
         }
-        Ok(EquationRows {
-            regressor,
-            measured,
-            is_judged,
-        })
+        Ok(EquationRows { regressor, measured })
     }
 }
 
-/// A segment with derivatives that are accurate enough for equations whose terms nearly cancel. At uneven times the
-/// derivatives of the preparation stay.
+/// A segment with derivatives that are accurate enough for the equations of a servo that follows its command, whose terms
+/// nearly cancel. At uneven times the derivatives of the preparation stay. Where nothing cancels, central differences
+/// have less noise.
 fn with_accurate_derivatives(segment: &RecordingSegment) -> RecordingSegment {
     let mut accurate = segment.clone();
     let run = &mut accurate.run;
